@@ -1,0 +1,64 @@
+//! GGX (Trowbridge-Reitz): `D(u) = alpha² / (pi ((alpha²-1) u² + 1)²)`, w the half-vector. Walter et al. 2007,
+//! equation 33.
+//!
+//! Widening borrows Beckmann's rule, `alpha'² = alpha² + 2v`, as every engine does: GGX is no Gaussian and
+//! has no variance, so this is a convention; `compare` measures what it costs. Zonal coefficients by quadrature.
+
+use std::f64::consts::PI;
+
+use super::{Argument, Brdf, Row, number};
+use crate::units::{Alpha, SlopeVariance};
+
+/// A GGX distribution of microfacets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ggx {
+    alpha_squared: f64,
+}
+
+impl Ggx {
+    /// A lobe of this width.
+    #[must_use]
+    pub fn new(alpha: Alpha) -> Self {
+        Self { alpha_squared: alpha.get() * alpha.get() }
+    }
+}
+
+pub(super) const ROW: Row = Row {
+    name: "ggx",
+    parameter: ":ALPHA",
+    summary: "GGX (Trowbridge-Reitz) microfacet distribution D(n·h)",
+    parse: |text| Ok(Box::new(Ggx::new(number(text, Alpha::new)?))),
+    samples: &["ggx:0.1", "ggx:0.4"],
+};
+
+impl Brdf for Ggx {
+    fn spelling(&self) -> String {
+        format!("{}:{}", ROW.name, self.alpha_squared.sqrt())
+    }
+
+    fn argument(&self) -> Argument {
+        Argument::Half
+    }
+
+    fn evaluate(&self, u: f64) -> f64 {
+        if u <= 0.0 {
+            return 0.0;
+        }
+        // 1 - u² + alpha² u²: the printed (alpha²-1) u² + 1 without its cancellation.
+        let u2 = (u * u).min(1.0);
+        let d = (1.0 - u2) + self.alpha_squared * u2;
+        self.alpha_squared / (PI * d * d)
+    }
+
+    fn evaluate_all(&self, u: &mut [f64]) {
+        u.iter_mut().for_each(|u| *u = self.evaluate(*u));
+    }
+
+    fn slope_variance(&self) -> Option<SlopeVariance> {
+        Some(SlopeVariance::clamped(self.alpha_squared / 2.0))
+    }
+
+    fn widen(&self, by: SlopeVariance) -> Box<dyn Brdf> {
+        Box::new(Self { alpha_squared: self.alpha_squared + 2.0 * by.get() })
+    }
+}

@@ -1,0 +1,38 @@
+//! ndfmap-core: the mathematics of filtering normals. No files, no GPU, no window.
+//!
+//! A *normal distribution map* is a mip pyramid whose texels say what the normals under them do, so that
+//! a highlight on a distant surface comes out as the mean of what it was up close. The way through:
+//!
+//! ```
+//! use glam::DVec3;
+//! use ndfmap_core::bake::Bake;
+//! use ndfmap_core::pyramid::Precision;
+//! use ndfmap_core::{brdf, grid::Size, ndf, procedural};
+//!
+//! // A surface: here a built-in one, elsewhere a normal or height map.
+//! let surface = (procedural::find("v-groove").unwrap().build)(Size::new(64, 64)?);
+//! // Bake it into every level of a representation of your choice ...
+//! let method = ndf::parse("slopes")?;
+//! let bake = Bake { surface: &*surface, method: &*method, precision: Precision::Half, progress: &|_| () };
+//! let (pyramid, _) = bake.to_pyramid();
+//! // ... and shade the coarsest texel with any BRDF, chosen now and not when baking.
+//! let brdf = brdf::parse("ggx:0.2")?;
+//! let straight_up = [DVec3::Z];
+//! let mut reflected = [0.0];
+//! let last = pyramid.sizes().len() - 1;
+//! method.evaluator(&*brdf, &straight_up).evaluate(&pyramid.texel(last, 0, 0), &mut reflected);
+//! // Both flanks of the groove lean away: far less light comes straight back than from a flat patch.
+//! assert!(reflected[0] < 0.3 * brdf.evaluate(1.0));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod bake;
+pub mod brdf;
+pub mod error;
+pub mod grid;
+pub mod ndf;
+pub mod procedural;
+pub mod pyramid;
+pub mod sphere;
+pub mod surface;
+pub mod units;

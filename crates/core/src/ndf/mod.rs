@@ -1,0 +1,303 @@
+//! How many normals point where: the contract every representation keeps, and the table of them.
+//!
+//! `bake → filter → decode → shade`. What is stored and filtered are **sums** ([`Representation::Sums`]),
+//! which mix by plain weighted averaging; what is shaded are decoded parameters
+//! ([`Representation::Lobes`]). They are two types, never one with flags. The typed contract is
+//! [`Representation`]; every one of them is also a [`Method`], the same thing for callers that choose at
+//! run time. [`TABLE`] has one row for each; a row buys the conformance suite in `conformance.rs`.
+//! Notation: `docs/notation.md`.
+
+mod fixed;
+mod naive;
+mod ndm;
+mod sh;
+mod slopes;
+mod toksvig;
+
+#[cfg(test)]
+mod conformance;
+
+pub use fixed::Fixed;
+pub use naive::Naive;
+pub use ndm::{Kernel, Ndm, Normalisation};
+pub use sh::{Coefficients, Sh};
+pub use slopes::{SlopeGaussian, SlopeMoments, Slopes};
+pub use toksvig::{Lobe, Toksvig};
+
+use std::fmt::Debug;
+
+use glam::{DMat3, DVec2, DVec3, Vec3};
+
+use crate::brdf::Brdf;
+use crate::surface::SurfaceRow;
+
+/// One fine texel, as a representation sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Unit normal.
+    pub normal: Vec3,
+    /// Height in texture widths; zero where the map has none.
+    pub height: f32,
+}
+
+/// A way to store a distribution of normals in a texel.
+pub trait Representation: Debug + Send + Sync {
+    /// Linear quantities, what is stored and filtered: means over the area seen.
+    type Sums: Clone + Debug + PartialEq;
+    /// What they decode to, and what is shaded.
+    type Lobes: Into<Decoded>;
+
+    /// The method's spelling on the command line, in full.
+    fn spelling(&self) -> String;
+
+    /// RGBA layers it fills.
+    fn layers(&self) -> usize;
+
+    /// What the channels are, as files name it.
+    fn encoding(&self) -> &'static str {
+        "sums"
+    }
+
+    /// Sums over nothing.
+    fn zero(&self) -> Self::Sums;
+
+    /// Adds a fine texel that covers the fraction `weight` of the area.
+    fn accumulate(&self, sums: &mut Self::Sums, sample: &Sample, weight: f32);
+
+    /// Adds the sums of a part that covers the fraction `weight` of the area.
+    fn blend(&self, sums: &mut Self::Sums, part: &Self::Sums, weight: f32);
+
+    /// Writes the sums as channels, four a layer. Spare channels are 1.
+    fn pack(&self, sums: &Self::Sums, channels: &mut [f32]);
+
+    /// Reads the sums back.
+    fn unpack(&self, channels: &[f32]) -> Self::Sums;
+
+    /// The distribution that the sums stand for; finite for any finite channels.
+    fn decode(&self, sums: &Self::Sums) -> Self::Lobes;
+
+    /// The effective lobe `w ↦ ∫ f(w·n) gamma(n) dn` under this distribution.
+    fn effective<'a>(&'a self, lobes: &Self::Lobes, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a>;
+
+    /// Sets channels that are computed from the filtered sums and are no sums themselves.
+    fn finish(&self, _channels: &mut [f32]) {}
+
+    /// True when [`Self::finish`] does something.
+    fn has_finish(&self) -> bool {
+        false
+    }
+
+    /// An evaluator for one lobe and one set of directions, which may hold tables for them.
+    fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a>
+    where
+        Self: Sized,
+    {
+        Box::new(OneByOne { representation: self, brdf, directions })
+    }
+
+    /// How the flat map's effective lobe differs from the lobe itself, when it does.
+    fn flat_lobe(&self, _brdf: &dyn Brdf) -> FlatLobe {
+        FlatLobe::Exact
+    }
+}
+
+/// What a representation makes of a map without any relief.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FlatLobe {
+    /// The lobe itself.
+    Exact,
+    /// The lobe cut off at this order of spherical harmonics.
+    BandLimited(usize),
+    /// The method's own kernel in place of the lobe's shape.
+    OwnKernel,
+}
+
+/// A decoded texel, for people and scripts to look at.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Decoded {
+    /// A mean normal: unit length for `naive` and `fixed`, shorter for `toksvig`.
+    Mean(DVec3),
+    /// A Gaussian in space.
+    Gaussian {
+        /// Mean normal.
+        mean: DVec3,
+        /// Covariance of the normals.
+        covariance: DMat3,
+    },
+    /// A Gaussian of slopes.
+    Slopes {
+        /// Mean height in texture widths.
+        height: f64,
+        /// Mean slope.
+        mean: DVec2,
+        /// Covariance of the slopes: xx, yy, xy.
+        covariance: [f64; 3],
+    },
+    /// Real spherical-harmonic coefficients: l, then m from -l to l.
+    Coefficients(Vec<f64>),
+}
+
+/// Effective lobes of one texel after another, for one BRDF at fixed directions.
+pub trait Evaluator: Send + Sync {
+    /// The effective lobe of the texel with these `channels` at every direction.
+    fn evaluate(&self, channels: &[f32], out: &mut [f64]);
+}
+
+struct OneByOne<'a, R> {
+    representation: &'a R,
+    brdf: &'a dyn Brdf,
+    directions: &'a [DVec3],
+}
+
+impl<R: Representation> Evaluator for OneByOne<'_, R> {
+    fn evaluate(&self, channels: &[f32], out: &mut [f64]) {
+        let lobes = self.representation.decode(&self.representation.unpack(channels));
+        let effective = self.representation.effective(&lobes, self.brdf);
+        for (out, w) in out.iter_mut().zip(self.directions) {
+            *out = effective(*w);
+        }
+    }
+}
+
+/// A [`Representation`] chosen at run time.
+pub trait Method: Debug + Send + Sync {
+    /// The spelling on the command line, in full.
+    fn spelling(&self) -> String;
+
+    /// RGBA layers.
+    fn layers(&self) -> usize;
+
+    /// What the channels are, as files name it.
+    fn encoding(&self) -> &'static str;
+
+    /// The channels of every fine texel of a row: layer after layer, each RGBA texels in order.
+    fn accumulate_row(&self, row: &SurfaceRow, channels: &mut [f32]);
+
+    /// Sets, in a filtered row of that layout, the channels that are no sums.
+    fn finish_row(&self, channels: &mut [f32]);
+
+    /// Decodes one texel's channels for people and scripts.
+    fn describe(&self, channels: &[f32]) -> Decoded;
+
+    /// An evaluator for one BRDF at fixed directions.
+    fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a>;
+
+    /// What it makes of a flat map.
+    fn flat_lobe(&self, brdf: &dyn Brdf) -> FlatLobe;
+}
+
+impl<R: Representation> Method for R {
+    fn spelling(&self) -> String {
+        Representation::spelling(self)
+    }
+
+    fn layers(&self) -> usize {
+        Representation::layers(self)
+    }
+
+    fn encoding(&self) -> &'static str {
+        Representation::encoding(self)
+    }
+
+    fn accumulate_row(&self, row: &SurfaceRow, channels: &mut [f32]) {
+        let (layers, width) = (Representation::layers(self), row.width());
+        let mut texel = vec![0.0; 4 * layers];
+        for i in 0..width {
+            let mut sums = self.zero();
+            self.accumulate(&mut sums, &Sample { normal: row.normal(i), height: row.height[i] }, 1.0);
+            self.pack(&sums, &mut texel);
+            for (layer, rgba) in texel.as_chunks::<4>().0.iter().enumerate() {
+                channels[(layer * width + i) * 4..][..4].copy_from_slice(rgba);
+            }
+        }
+    }
+
+    fn finish_row(&self, channels: &mut [f32]) {
+        if !self.has_finish() {
+            return;
+        }
+        let layers = Representation::layers(self);
+        let width = channels.len() / (4 * layers);
+        let mut texel = vec![0.0; 4 * layers];
+        for i in 0..width {
+            for (layer, rgba) in texel.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+                rgba.copy_from_slice(&channels[(layer * width + i) * 4..][..4]);
+            }
+            self.finish(&mut texel);
+            for (layer, rgba) in texel.as_chunks::<4>().0.iter().enumerate() {
+                channels[(layer * width + i) * 4..][..4].copy_from_slice(rgba);
+            }
+        }
+    }
+
+    fn describe(&self, channels: &[f32]) -> Decoded {
+        self.decode(&self.unpack(channels)).into()
+    }
+
+    fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
+        Representation::evaluator(self, brdf, directions)
+    }
+
+    fn flat_lobe(&self, brdf: &dyn Brdf) -> FlatLobe {
+        Representation::flat_lobe(self, brdf)
+    }
+}
+
+/// A row of [`TABLE`].
+pub struct Row {
+    /// The word before the first colon.
+    pub name: &'static str,
+    /// What may follow it, for help.
+    pub parameters: &'static str,
+    /// One line for help and docs.
+    pub summary: &'static str,
+    /// Where it was published.
+    pub paper: &'static str,
+    /// Reads what follows the name, split at colons.
+    pub parse: fn(&[&str]) -> Result<Box<dyn Method>, String>,
+    /// Spellings that the conformance suite runs, the plain one first.
+    pub samples: &'static [&'static str],
+}
+
+/// Every representation there is.
+pub static TABLE: &[Row] = &[fixed::ROW, naive::ROW, toksvig::ROW, ndm::ROW, slopes::ROW, sh::ROW];
+
+/// A spelling that names no representation.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ParseMethodError {
+    /// No row of the table has this name.
+    #[error("there is no method called `{0}`")]
+    Unknown(String),
+    /// What follows the name is wrong.
+    #[error("method `{spelling}`: {reason}")]
+    Parameter {
+        /// What was written.
+        spelling: String,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+/// Reads a spelling such as `toksvig`, `sh:7` or `ndm:pearson:integrated`.
+///
+/// # Errors
+/// [`ParseMethodError`], naming what is wrong.
+pub fn parse(spelling: &str) -> Result<Box<dyn Method>, ParseMethodError> {
+    let words: Vec<&str> = spelling.split(':').collect();
+    let row = TABLE
+        .iter()
+        .find(|row| row.name == words[0])
+        .ok_or_else(|| ParseMethodError::Unknown(words[0].to_owned()))?;
+    (row.parse)(&words[1..])
+        .map_err(|reason| ParseMethodError::Parameter { spelling: spelling.to_owned(), reason })
+}
+
+/// For rows without parameters.
+fn no_parameters(words: &[&str], method: impl Method + 'static) -> Result<Box<dyn Method>, String> {
+    if words.is_empty() { Ok(Box::new(method)) } else { Err("takes no parameter".to_owned()) }
+}
+
+/// A direction, or `(0,0,1)` for a vector that is none.
+fn direction_or_up(v: DVec3) -> DVec3 {
+    v.try_normalize().unwrap_or(DVec3::Z)
+}

@@ -1,0 +1,88 @@
+//! `naive`: the mean normal, renormalised after filtering; the lobe unchanged.
+//!
+//! "Normalised MIP-mapping" of Han et al. 2007, figure 2. It keeps the direction and forgets the spread,
+//! so highlights stay as sharp as on the finest level.
+
+use glam::{DVec3, Vec3};
+
+use super::{Decoded, Representation, Row, Sample, direction_or_up, no_parameters};
+use crate::brdf::Brdf;
+
+/// Normalised mip-mapping.
+#[derive(Clone, Copy, Debug)]
+pub struct Naive;
+
+pub(super) const ROW: Row = Row {
+    name: "naive",
+    parameters: "",
+    summary: "the fine lobe around the mean normal, renormalised",
+    paper: "Han et al. 2007 (baseline)",
+    parse: |words| no_parameters(words, Naive),
+    samples: &["naive"],
+};
+
+/// One direction and nothing else.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnitMean {
+    direction: DVec3,
+}
+
+impl UnitMean {
+    /// The direction of `v`; `(0,0,1)` when it has none.
+    pub(super) fn new(v: DVec3) -> Self {
+        Self { direction: direction_or_up(v) }
+    }
+
+    /// The lobe itself, around the direction.
+    pub(super) fn effective<'a>(&self, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+        let n = self.direction;
+        Box::new(move |w| brdf.evaluate(w.dot(n)))
+    }
+}
+
+impl From<UnitMean> for Decoded {
+    fn from(lobe: UnitMean) -> Self {
+        Self::Mean(lobe.direction)
+    }
+}
+
+impl Representation for Naive {
+    type Sums = Vec3;
+    type Lobes = UnitMean;
+
+    fn spelling(&self) -> String {
+        ROW.name.to_owned()
+    }
+
+    fn layers(&self) -> usize {
+        1
+    }
+
+    fn zero(&self) -> Vec3 {
+        Vec3::ZERO
+    }
+
+    fn accumulate(&self, sums: &mut Vec3, sample: &Sample, weight: f32) {
+        *sums += weight * sample.normal;
+    }
+
+    fn blend(&self, sums: &mut Vec3, part: &Vec3, weight: f32) {
+        *sums += weight * *part;
+    }
+
+    fn pack(&self, sums: &Vec3, channels: &mut [f32]) {
+        channels.copy_from_slice(&sums.extend(1.0).to_array());
+    }
+
+    fn unpack(&self, channels: &[f32]) -> Vec3 {
+        Vec3::from_slice(channels)
+    }
+
+    fn decode(&self, sums: &Vec3) -> UnitMean {
+        UnitMean::new(sums.as_dvec3())
+    }
+
+    fn effective<'a>(&'a self, lobes: &UnitMean, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+        lobes.effective(brdf)
+    }
+}

@@ -1,0 +1,225 @@
+//! `slopes`: first and second moments of the slope, a non-centred Gaussian. LEAN (Olano and Baker 2010) and
+//! LEADR (Dupuy et al. 2013): `E[x], E[y], E[x²], E[y²], E[xy]` and the mean height.
+//!
+//! The base lobe's slope variance adds to both variances at shading time, and the lobe's own profile is
+//! stretched by the sum: in slopes, per unit of map area, a lobe around the vertical is
+//! `p(t) = f(u) u³`, u = 1/sqrt(1+t²), and t becomes the Mahalanobis distance in units of the lobe's own
+//! deviation. With no spread that is the lobe itself; for a Gaussian of angles it is LEAN's Gaussian.
+//! The density is per map area, `gamma = P22 / w.z³`, because that is how a normal map's texels weigh; LEAN's
+//! `D = P22 / w.z⁴` counts facet area and is brighter by 1/w.z where the map is steep (`docs/methods.md`
+//! has what that costs). Lambert is averaged over 5×5 slopes of the Gaussian, as in LEADR.
+
+use glam::{DVec2, DVec3};
+
+use super::{Decoded, Representation, Row, Sample, no_parameters};
+use crate::brdf::Brdf;
+use crate::surface::slope_of_normal;
+use crate::units::SlopeVariance;
+
+/// Moments of the slope.
+#[derive(Clone, Copy, Debug)]
+pub struct Slopes;
+
+pub(super) const ROW: Row = Row {
+    name: "slopes",
+    parameters: "",
+    summary: "one anisotropic Gaussian of slopes, with the mean height",
+    paper: "Olano and Baker 2010 (LEAN); Dupuy et al. 2013 (LEADR)",
+    parse: |words| no_parameters(words, Slopes),
+    samples: &["slopes"],
+};
+
+/// What is stored: means of height, slope and products of slopes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SlopeMoments {
+    /// `E[h]` in texture widths.
+    pub height: f32,
+    /// `E[x], E[y]`.
+    pub mean: [f32; 2],
+    /// `E[x²], E[y²], E[xy]`.
+    pub second: [f32; 3],
+}
+
+/// A Gaussian of slopes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SlopeGaussian {
+    /// Mean height in texture widths.
+    pub height: f64,
+    /// Mean slope.
+    pub mean: DVec2,
+    /// Covariance: xx, yy, xy. Never indefinite.
+    pub covariance: [f64; 3],
+}
+
+impl From<SlopeGaussian> for Decoded {
+    fn from(g: SlopeGaussian) -> Self {
+        Self::Slopes { height: g.height, mean: g.mean, covariance: g.covariance }
+    }
+}
+
+impl SlopeGaussian {
+    /// This distribution convolved with an isotropic one.
+    #[must_use]
+    pub fn widen(self, by: SlopeVariance) -> Self {
+        let [xx, yy, xy] = self.covariance;
+        Self { covariance: [xx + by.get(), yy + by.get(), xy], ..self }
+    }
+}
+
+/// Stretches the profile of a lobe of width `base` by a covariance that already holds that width.
+///
+/// Returns a function of a slope relative to the mean: the density there, per unit of slope area.
+pub(super) fn stretched<'a>(
+    brdf: &'a dyn Brdf,
+    base: SlopeVariance,
+    covariance: [f64; 3],
+) -> impl Fn(DVec2) -> f64 + 'a {
+    let [xx, yy, xy] = covariance;
+    let determinant = (xx * yy - xy * xy).max(f64::MIN_POSITIVE);
+    let (base, area) = (base.get(), base.get() / determinant.sqrt());
+    move |d| {
+        let mahalanobis = (yy * d.x * d.x - 2.0 * xy * d.x * d.y + xx * d.y * d.y) / determinant;
+        let u2 = 1.0 / (1.0 + base * mahalanobis);
+        brdf.evaluate(u2.sqrt()) * u2 * u2.sqrt() * area
+    }
+}
+
+/// Positions (in deviations) and weights of 5-point Gauss-Hermite quadrature: exact to degree 9.
+const HERMITE: [(f64, f64); 5] = [
+    (-2.856_970_013_872_805_7, 0.011_257_411_327_720_689),
+    (-1.355_626_179_974_265_9, 0.222_075_922_005_612_64),
+    (0.0, 0.533_333_333_333_333_3),
+    (1.355_626_179_974_265_9, 0.222_075_922_005_612_64),
+    (2.856_970_013_872_805_7, 0.011_257_411_327_720_689),
+];
+
+/// Normals of 5×5 slopes of the Gaussian, with weights that sum to one.
+fn slope_samples(g: &SlopeGaussian) -> Vec<(DVec3, f64)> {
+    let [xx, yy, xy] = g.covariance;
+    let deviation = xx.sqrt();
+    let shear = if deviation > 0.0 { xy / deviation } else { 0.0 };
+    let rest = (yy - shear * shear).max(0.0).sqrt();
+    let mut samples = Vec::with_capacity(25);
+    for (a, wa) in HERMITE {
+        for (b, wb) in HERMITE {
+            let slope = g.mean + DVec2::new(deviation * a, shear * a + rest * b);
+            samples.push((DVec3::new(-slope.x, -slope.y, 1.0).normalize(), wa * wb));
+        }
+    }
+    samples
+}
+
+impl Representation for Slopes {
+    type Sums = SlopeMoments;
+    type Lobes = SlopeGaussian;
+
+    fn spelling(&self) -> String {
+        ROW.name.to_owned()
+    }
+
+    fn layers(&self) -> usize {
+        2
+    }
+
+    fn zero(&self) -> SlopeMoments {
+        SlopeMoments::default()
+    }
+
+    fn accumulate(&self, sums: &mut SlopeMoments, sample: &Sample, weight: f32) {
+        let s = slope_of_normal(sample.normal);
+        let one = SlopeMoments {
+            height: sample.height,
+            mean: s.to_array(),
+            second: [s.x * s.x, s.y * s.y, s.x * s.y],
+        };
+        self.blend(sums, &one, weight);
+    }
+
+    fn blend(&self, sums: &mut SlopeMoments, part: &SlopeMoments, weight: f32) {
+        sums.height += weight * part.height;
+        for (sum, p) in sums.mean.iter_mut().zip(part.mean) {
+            *sum += weight * p;
+        }
+        for (sum, p) in sums.second.iter_mut().zip(part.second) {
+            *sum += weight * p;
+        }
+    }
+
+    fn pack(&self, sums: &SlopeMoments, channels: &mut [f32]) {
+        let ([x, y], [xx, yy, xy]) = (sums.mean, sums.second);
+        channels.copy_from_slice(&[sums.height, x, y, 1.0, xx, yy, xy, 1.0]);
+    }
+
+    fn unpack(&self, channels: &[f32]) -> SlopeMoments {
+        SlopeMoments {
+            height: channels[0],
+            mean: [channels[1], channels[2]],
+            second: [channels[4], channels[5], channels[6]],
+        }
+    }
+
+    fn decode(&self, sums: &SlopeMoments) -> SlopeGaussian {
+        let [x, y] = sums.mean.map(f64::from);
+        let [xx, yy, xy] = sums.second.map(f64::from);
+        // Rounding of the stored moments can leave a variance below zero or a correlation beyond one.
+        let (xx, yy) = ((xx - x * x).max(0.0), (yy - y * y).max(0.0));
+        let limit = (xx * yy).sqrt();
+        let covariance = [xx, yy, (xy - x * y).clamp(-limit, limit)];
+        SlopeGaussian { height: f64::from(sums.height), mean: DVec2::new(x, y), covariance }
+    }
+
+    fn effective<'a>(&'a self, lobes: &SlopeGaussian, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+        let Some(base) = brdf.slope_variance() else {
+            let samples = slope_samples(lobes);
+            return Box::new(move |w| {
+                samples.iter().map(|(n, weight)| weight * brdf.evaluate(w.dot(*n))).sum()
+            });
+        };
+        let mean = lobes.mean;
+        let p22 = stretched(brdf, base, lobes.widen(base).covariance);
+        Box::new(move |w| {
+            if w.z <= 0.0 {
+                return 0.0;
+            }
+            p22(DVec2::new(-w.x, -w.y) / w.z - mean) / w.z.powi(3)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::Beckmann;
+    use crate::units::Alpha;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn beckmann_on_gaussian_slopes_is_the_closed_form() {
+        // Beckmann's profile per map area is its Gaussian over u: f u³ = P22 / u.
+        let alpha = 0.3;
+        let brdf = Beckmann::new(Alpha::new(alpha).unwrap());
+        let g = SlopeGaussian { height: 0.0, mean: DVec2::new(0.2, -0.1), covariance: [0.05, 0.02, 0.01] };
+        let effective = Slopes.effective(&g, &brdf);
+        let w = DVec3::new(0.1, 0.3, 0.9).normalize();
+        let d = DVec2::new(-w.x, -w.y) / w.z - g.mean;
+        let base = alpha * alpha / 2.0;
+        let (xx, yy, xy) = (0.05 + base, 0.02 + base, 0.01);
+        let det = xx * yy - xy * xy;
+        let q = (yy * d.x * d.x - 2.0 * xy * d.x * d.y + xx * d.y * d.y) / det;
+        let expected = (-q / 2.0).exp() / (2.0 * PI * det.sqrt()) * (1.0 + base * q).sqrt() / w.z.powi(3);
+        assert!((effective(w) - expected).abs() < 1e-12 * expected);
+    }
+
+    #[test]
+    fn quadrature_of_slopes_has_the_moments() {
+        let g = SlopeGaussian { height: 0.0, mean: DVec2::new(0.2, -0.1), covariance: [0.05, 0.02, 0.01] };
+        let samples = slope_samples(&g);
+        let mean = |f: &dyn Fn(DVec2) -> f64| -> f64 {
+            samples.iter().map(|(n, w)| w * f(DVec2::new(-n.x, -n.y) / n.z)).sum()
+        };
+        assert!((mean(&|_| 1.0) - 1.0).abs() < 1e-14);
+        assert!((mean(&|s| s.x) - 0.2).abs() < 1e-14);
+        assert!((mean(&|s| s.x * s.y) - (0.01 - 0.02)).abs() < 1e-14);
+        assert!((mean(&|s| s.y * s.y) - (0.02 + 0.01)).abs() < 1e-14);
+    }
+}

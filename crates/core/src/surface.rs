@@ -1,0 +1,350 @@
+//! Heights, slopes and normals: the one place that knows the sign conventions.
+//!
+//! Tangent frame: x to the right of the picture, y **up** (image rows run down, so y is minus the
+//! row direction), z out of the surface. A height field `h` has slope `(dh/dx, dh/dy)`; its normal
+//! is `(-slope.x, -slope.y, 1)` normalised (`docs/notation.md`). Heights are in units of the texture's
+//! width on both axes, so slopes have no unit and do not depend on the resolution.
+
+use glam::{Vec2, Vec3};
+
+use crate::grid::{Grid, Size};
+
+/// What lies beyond the edge of a map, on one axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// The map tiles.
+    #[default]
+    Repeat,
+    /// The edge texel goes on for ever.
+    Clamp,
+}
+
+impl Wrap {
+    /// The texel that stands for coordinate `i`, which may lie outside `0..n`.
+    #[must_use]
+    pub fn index(self, i: isize, n: usize) -> usize {
+        match self {
+            Self::Repeat => i.rem_euclid(n as isize) as usize,
+            Self::Clamp => i.clamp(0, n as isize - 1) as usize,
+        }
+    }
+}
+
+/// [`Wrap`] of each axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wraps {
+    /// Along a row.
+    pub x: Wrap,
+    /// Along a column.
+    pub y: Wrap,
+}
+
+/// Largest slope on one axis that the project keeps apart from "vertical".
+///
+/// Its square is the largest second moment that a half float holds (65025 < 65504). A normal at or
+/// below the horizon has no slope at all and gets this one, in its own direction.
+pub const MAX_SLOPE: f32 = 255.0;
+
+/// Slope of a unit normal, each axis held to [`MAX_SLOPE`]: `(-n.x/n.z, -n.y/n.z)`.
+#[inline]
+#[must_use]
+pub fn slope_of_normal(n: Vec3) -> Vec2 {
+    let z = n.z.max(f32::MIN_POSITIVE);
+    Vec2::new((-n.x / z).clamp(-MAX_SLOPE, MAX_SLOPE), (-n.y / z).clamp(-MAX_SLOPE, MAX_SLOPE))
+}
+
+/// Unit normal of a slope: `(-x, -y, 1) / sqrt(1 + x² + y²)`.
+#[inline]
+#[must_use]
+pub fn normal_of_slope(slope: Vec2) -> Vec3 {
+    Vec3::new(-slope.x, -slope.y, 1.0) * (1.0 + slope.length_squared()).sqrt().recip()
+}
+
+/// A stored vector as a unit normal; one that is no direction (zero or not finite) is `(0,0,1)`.
+#[inline]
+#[must_use]
+pub fn unit_or_up(v: Vec3) -> Vec3 {
+    let length_squared = v.length_squared();
+    // 1e-12 lies far below (1/255)², the shortest vector an 8-bit map can mean.
+    if length_squared > 1e-12 && length_squared < f32::INFINITY {
+        v * length_squared.sqrt().recip()
+    } else {
+        Vec3::Z
+    }
+}
+
+/// One row of the finest level: unit normals, and heights in texture widths.
+///
+/// Planes, not structs, so that the loops over them become SIMD without being written as such.
+#[derive(Clone, Debug)]
+pub struct SurfaceRow {
+    /// `n.x` of each texel.
+    pub x: Vec<f32>,
+    /// `n.y`, up.
+    pub y: Vec<f32>,
+    /// `n.z`, out of the surface.
+    pub z: Vec<f32>,
+    /// Height; zero where the map has none.
+    pub height: Vec<f32>,
+}
+
+impl SurfaceRow {
+    /// A flat row of `width` texels.
+    #[must_use]
+    pub fn flat(width: usize) -> Self {
+        Self { x: vec![0.0; width], y: vec![0.0; width], z: vec![1.0; width], height: vec![0.0; width] }
+    }
+
+    /// Number of texels.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.x.len()
+    }
+
+    /// Unit normal of texel `i`.
+    #[inline]
+    #[must_use]
+    pub fn normal(&self, i: usize) -> Vec3 {
+        Vec3::new(self.x[i], self.y[i], self.z[i])
+    }
+
+    /// Sets the unit normal of texel `i`.
+    #[inline]
+    pub fn set_normal(&mut self, i: usize, n: Vec3) {
+        (self.x[i], self.y[i], self.z[i]) = (n.x, n.y, n.z);
+    }
+}
+
+/// The finest level of a map, read a row at a time so that no copy of it in floats need exist.
+pub trait Surface: Sync {
+    /// Width and height in texels.
+    fn size(&self) -> Size;
+
+    /// What lies beyond the edges.
+    fn wraps(&self) -> Wraps;
+
+    /// Overwrites all of `row` (as wide as the map) with row `y`.
+    fn read_row(&self, y: usize, row: &mut SurfaceRow);
+
+    /// True when the heights mean something.
+    fn has_height(&self) -> bool {
+        false
+    }
+}
+
+/// A normal map of unit normals in memory.
+#[derive(Clone, Debug)]
+pub struct NormalGrid {
+    /// Unit normals.
+    pub normals: Grid<Vec3>,
+    /// What lies beyond the edges.
+    pub wraps: Wraps,
+}
+
+impl Surface for NormalGrid {
+    fn size(&self) -> Size {
+        self.normals.size()
+    }
+
+    fn wraps(&self) -> Wraps {
+        self.wraps
+    }
+
+    fn read_row(&self, y: usize, row: &mut SurfaceRow) {
+        for (i, n) in self.normals.row(y).iter().enumerate() {
+            row.set_normal(i, *n);
+        }
+        row.height.fill(0.0);
+    }
+}
+
+/// How slopes are taken from heights.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SlopeFilter {
+    /// `(h[i+1] - h[i-1]) / 2`: sharper, and what RenderMan's `txmake` does.
+    #[default]
+    CentralDifference,
+    /// The 3×3 Sobel kernel: smooths across the derivative; OpenImageIO's default.
+    Sobel,
+}
+
+/// A height map, with slopes taken when read.
+#[derive(Clone, Debug)]
+pub struct HeightField {
+    /// Heights in units of the texture's width.
+    pub heights: Grid<f32>,
+    /// What lies beyond the edges; also used for the slopes there.
+    pub wraps: Wraps,
+    /// How slopes are taken.
+    pub filter: SlopeFilter,
+}
+
+impl Surface for HeightField {
+    fn size(&self) -> Size {
+        self.heights.size()
+    }
+
+    fn wraps(&self) -> Wraps {
+        self.wraps
+    }
+
+    fn has_height(&self) -> bool {
+        true
+    }
+
+    fn read_row(&self, y: usize, row: &mut SurfaceRow) {
+        let Size { width, height } = self.size();
+        let line = |dy: isize| self.heights.row(self.wraps.y.index(y as isize + dy, height));
+        let (above, here, below) = (line(-1), line(0), line(1));
+        // A texel is 1/width of the texture's width across, on both axes.
+        let per_texel = width as f32;
+        let mut set = |i: usize, l: usize, r: usize| {
+            let slope = match self.filter {
+                SlopeFilter::CentralDifference => Vec2::new(here[r] - here[l], above[i] - below[i]) * 0.5,
+                SlopeFilter::Sobel => {
+                    let dx = (above[r] - above[l]) + 2.0 * (here[r] - here[l]) + (below[r] - below[l]);
+                    let dy = (above[l] - below[l]) + 2.0 * (above[i] - below[i]) + (above[r] - below[r]);
+                    Vec2::new(dx, dy) * 0.125
+                }
+            } * per_texel;
+            row.set_normal(i, normal_of_slope(slope));
+        };
+        let edge = |i: isize| self.wraps.x.index(i, width);
+        set(0, edge(-1), edge(1));
+        for i in 1..width.saturating_sub(1) {
+            set(i, i - 1, i + 1);
+        }
+        if width > 1 {
+            let last = width as isize - 1;
+            set(width - 1, edge(last - 1), edge(last + 1));
+        }
+        row.height.copy_from_slice(here);
+    }
+}
+
+/// How well a map's slopes are the gradient of *some* height, signed: 1 for a perfect gradient field,
+/// near 0 when nothing can be said (noise, a UV atlas), negative when y points the other way.
+///
+/// The mixed derivatives of a height agree, so slope.x differentiated along y and slope.y along x
+/// are correlated over all texels whose normals stay clear of the horizon (n.z > 0.15).
+#[must_use]
+pub fn integrability(surface: &dyn Surface) -> f64 {
+    let Size { width, height } = surface.size();
+    if width < 3 || height < 3 {
+        return 0.0;
+    }
+    let mut rows: Vec<SurfaceRow> = (0..3).map(|_| SurfaceRow::flat(width)).collect();
+    for (y, row) in rows.iter_mut().enumerate() {
+        surface.read_row(y, row);
+    }
+    let (mut xy, mut xx, mut yy) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for y in 1..height - 1 {
+        let [above, here, below] = [0, 1, 2].map(|k| &rows[(y - 1 + k) % 3]);
+        for i in 1..width - 1 {
+            let around = [above.normal(i), below.normal(i), here.normal(i - 1), here.normal(i + 1)];
+            if around.iter().all(|n| n.z > 0.15) {
+                let [a, b, l, r] = around.map(slope_of_normal);
+                let (dp_dy, dq_dx) = (f64::from(a.x - b.x), f64::from(r.y - l.y));
+                xy += dp_dy * dq_dx;
+                xx += dp_dy * dp_dy;
+                yy += dq_dx * dq_dx;
+            }
+        }
+        if y + 2 < height {
+            surface.read_row(y + 2, &mut rows[(y + 2) % 3]);
+        }
+    }
+    let norm = (xx * yy).sqrt();
+    if norm > 0.0 { xy / norm } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f32::consts::TAU;
+
+    fn wave(size: Size) -> HeightField {
+        let h = |x: usize, y: usize| {
+            let (u, v) = ((x as f32 + 0.5) / size.width as f32, (y as f32 + 0.5) / size.width as f32);
+            0.01 * (TAU * (2.0 * u - v)).sin()
+        };
+        HeightField {
+            heights: Grid::from_fn(size, h),
+            wraps: Wraps::default(),
+            filter: SlopeFilter::default(),
+        }
+    }
+
+    #[test]
+    fn slopes_of_a_wave_match_its_derivative() {
+        let size = Size::new(256, 256).unwrap();
+        for filter in [SlopeFilter::CentralDifference, SlopeFilter::Sobel] {
+            let surface = HeightField { filter, ..wave(size) };
+            let mut row = SurfaceRow::flat(size.width);
+            surface.read_row(0, &mut row);
+            for i in [0, 1, 100, 255] {
+                let (u, v) = ((i as f32 + 0.5) / 256.0, 0.5 / 256.0);
+                let c = 0.01 * TAU * (TAU * (2.0 * u - v)).cos();
+                let got = slope_of_normal(row.normal(i));
+                // v runs down, y runs up: dh/dy = -dh/dv. Central differences of a wave of 128
+                // texels err by (2 pi / 128)² / 6 = 0.04 %, Sobel's smoothing by twice that.
+                let expected = Vec2::new(2.0 * c, c);
+                assert!((got - expected).length() < 2e-3 * 0.14, "{filter:?} at {i}: {got} for {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn clamp_and_repeat_differ_at_the_edge_only() {
+        let size = Size::new(8, 8).unwrap();
+        let ramp = |wrap| HeightField {
+            heights: Grid::from_fn(size, |x, _| x as f32 / 8.0),
+            wraps: Wraps { x: wrap, y: wrap },
+            filter: SlopeFilter::CentralDifference,
+        };
+        let mut row = SurfaceRow::flat(8);
+        ramp(Wrap::Clamp).read_row(3, &mut row);
+        assert!((slope_of_normal(row.normal(0)).x - 0.5).abs() < 1e-6);
+        assert!((slope_of_normal(row.normal(4)).x - 1.0).abs() < 1e-6);
+        ramp(Wrap::Repeat).read_row(3, &mut row);
+        assert!((slope_of_normal(row.normal(0)).x + 3.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn integrability_tells_up_from_down() {
+        let size = Size::new(64, 64).unwrap();
+        let up = wave(size);
+        assert!(integrability(&up) > 0.999);
+        let mut row = SurfaceRow::flat(64);
+        let normals = (0..64).flat_map(|y| {
+            up.read_row(y, &mut row);
+            (0..64).map(|i| row.normal(i) * Vec3::new(1.0, -1.0, 1.0)).collect::<Vec<_>>()
+        });
+        let normals = Grid::from_vec(size, normals.collect()).unwrap();
+        let down = NormalGrid { normals, wraps: Wraps::default() };
+        assert!(integrability(&down) < -0.999);
+    }
+
+    #[test]
+    fn vectors_that_are_no_direction_point_up() {
+        for v in [Vec3::ZERO, Vec3::NAN, Vec3::INFINITY, Vec3::splat(1e30)] {
+            assert_eq!(unit_or_up(v), Vec3::Z);
+        }
+        assert!((unit_or_up(Vec3::new(-1.0, -1.0, -1.0)).length() - 1.0).abs() < 1e-6);
+        assert_eq!(slope_of_normal(Vec3::NEG_X), Vec2::new(MAX_SLOPE, 0.0));
+        assert_eq!(slope_of_normal(Vec3::new(0.0, 0.0, -1.0)), Vec2::ZERO);
+    }
+
+    #[test]
+    fn one_texel_surfaces_read() {
+        for (w, h) in [(1, 1), (1, 5), (5, 1), (2, 2)] {
+            let size = Size::new(w, h).unwrap();
+            let field = wave(size);
+            let mut row = SurfaceRow::flat(w);
+            for y in 0..h {
+                field.read_row(y, &mut row);
+                assert!(row.z.iter().all(|z| *z > 0.0));
+            }
+        }
+    }
+}
