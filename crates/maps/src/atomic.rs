@@ -1,0 +1,119 @@
+//! Files that are either whole or not there: written under another name, then renamed.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use tempfile::TempPath;
+
+use crate::MapError;
+
+/// Names of files being written, for [`abandon_all`].
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// A file under a temporary name beside its final one; dropped unfinished, it is removed.
+#[derive(Debug)]
+pub struct AtomicFile {
+    file: File,
+    temporary: TempPath,
+    target: PathBuf,
+}
+
+impl AtomicFile {
+    /// Opens a temporary file in the folder of `target`.
+    ///
+    /// # Errors
+    /// [`MapError`] when the folder does not take a file, or `target` is a folder.
+    pub fn create(target: &Path) -> Result<Self, MapError> {
+        if target.is_dir() {
+            return Err(MapError::invalid(target, "is a folder, not a file"));
+        }
+        let folder = match target.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        };
+        let mut builder = tempfile::Builder::new();
+        // Readable as any new file is; the crate's default is for secrets.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
+        let made =
+            builder.prefix(".ndfmap-").tempfile_in(folder).map_err(|e| MapError::io(target, e.into()))?;
+        let (file, temporary) = made.into_parts();
+        unfinished().push(temporary.to_path_buf());
+        Ok(Self { file, temporary, target: target.to_owned() })
+    }
+
+    /// The file to write to.
+    pub fn file(&mut self) -> &mut File {
+        &mut self.file
+    }
+
+    /// The final name, for messages.
+    #[must_use]
+    pub fn target(&self) -> &Path {
+        &self.target
+    }
+
+    /// Gives the file its final name, replacing what had it.
+    ///
+    /// # Errors
+    /// [`MapError`] when the rename fails; the temporary file is removed.
+    pub fn finish(self) -> Result<(), MapError> {
+        let Self { file, temporary, target } = self;
+        drop(file);
+        let name = temporary.to_path_buf();
+        let renamed = temporary.persist(&target).map_err(|e| MapError::io(&target, e.error));
+        unfinished().retain(|unfinished| *unfinished != name);
+        renamed
+    }
+}
+
+/// Writes a whole file at once.
+///
+/// # Errors
+/// [`MapError`] when it cannot be written; then nothing is left behind.
+pub fn write(target: &Path, bytes: &[u8]) -> Result<(), MapError> {
+    use std::io::Write;
+    let mut file = AtomicFile::create(target)?;
+    file.file().write_all(bytes).map_err(|e| MapError::io(target, e))?;
+    file.finish()
+}
+
+/// Removes every file that is still being written. For an interrupt handler, just before the end.
+pub fn abandon_all() {
+    for path in unfinished().drain(..) {
+        // Finished or dropped meanwhile: nothing to remove, and nobody left to tell.
+        let _gone = std::fs::remove_file(path);
+    }
+}
+
+fn unfinished() -> std::sync::MutexGuard<'static, Vec<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    #[test]
+    fn unfinished_files_leave_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("a.ktx2");
+        let mut file = AtomicFile::create(&target).unwrap();
+        file.file().write_all(b"half").unwrap();
+        drop(file);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        write(&target, b"whole").unwrap();
+        assert_eq!(std::fs::read(&target).unwrap(), b"whole");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn folders_and_missing_folders_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(AtomicFile::create(folder.path()).unwrap_err().to_string().contains("is a folder"));
+        let error = AtomicFile::create(&folder.path().join("no/such.ktx2")).unwrap_err().to_string();
+        assert!(error.contains("such.ktx2"), "{error}");
+    }
+}

@@ -1,0 +1,50 @@
+//! What can go wrong with a file, always with its name.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A file that could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum MapError {
+    /// The operating system said no.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What it said.
+        source: io::Error,
+    },
+    /// The file is damaged, or not what its name says.
+    #[error("{}: {reason}", path.display())]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The file is sound, but of a kind that cannot be used here.
+    #[error("{}: {reason}", path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// What is not supported, and what is.
+        reason: String,
+    },
+}
+
+impl MapError {
+    /// The operating system's error on `path`.
+    pub fn io(path: &Path, source: io::Error) -> Self {
+        Self::Io { path: path.to_owned(), source }
+    }
+
+    /// A damaged file.
+    pub fn invalid(path: &Path, reason: impl ToString) -> Self {
+        Self::Invalid { path: path.to_owned(), reason: reason.to_string() }
+    }
+
+    /// A sound file of the wrong kind.
+    pub fn unsupported(path: &Path, reason: impl ToString) -> Self {
+        Self::Unsupported { path: path.to_owned(), reason: reason.to_string() }
+    }
+}

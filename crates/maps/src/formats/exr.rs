@@ -1,0 +1,420 @@
+//! OpenEXR by the `exr` crate: plain pictures in, and normal distribution maps in and out in two layouts.
+//!
+//! **Native**: one part a layer, named `layer0`, `layer1` ..., RGBA, tiled and mip-mapped, with the
+//! header as the attribute `ndfmap`. **Bumpslopes**: OpenImageIO's six channels, for `slopes`, as
+//! `maketx --bumpslopes` writes them: slopes of a height map per texel in the file's own units with t
+//! down the image, slopes of a normal map as `-n.xy / n.z` of the vectors as stored, and `b0_h` = -1.
+
+use std::io::{Cursor, Seek, Write};
+use std::path::Path;
+
+use ::exr::math::RoundingMode;
+use ::exr::meta::MetaData;
+use ::exr::meta::attribute::{AttributeValue, Text};
+use ::exr::prelude::{
+    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image as ExrImage, ImageAttributes,
+    IntegerBounds, Layer, LayerAttributes, Levels, LineOrder, ReadChannels, ReadLayers, Vec2, WritableImage,
+    f16, read,
+};
+use ndfmap_core::grid::Size;
+use ndfmap_core::pyramid::{Precision, Pyramid, level_sizes};
+
+use super::Format;
+use crate::atomic::AtomicFile;
+use crate::header::{Source, SourceKind, VERSION};
+use crate::image::{MAX_TEXELS, check_size};
+use crate::{Header, Image, MapError, NdfMap, Samples};
+
+pub(super) const FORMAT: Format = Format {
+    name: "OpenEXR",
+    extensions: &["exr", "tx"],
+    magic: &[b"\x76\x2f\x31\x01"],
+    read_image: Some(read_image),
+    read_ndf: Some(read_ndf),
+};
+
+/// The attribute that holds our [`Header`].
+const KEY: &str = "ndfmap";
+
+/// OpenImageIO's channels, in the order of its file.
+pub const BUMPSLOPES: [&str; 6] = ["b0_h", "b1_dhds", "b2_dhdt", "b3_dhds2", "b4_dhdt2", "b5_dh2dsdt"];
+
+/// Tiles of this many texels a side, as OpenImageIO's own.
+const TILE: usize = 64;
+
+type AnyLayer = Layer<AnyChannels<Levels<FlatSamples>>>;
+
+/// Checks every part of the header, before any texel is read.
+fn check_header(path: &Path, bytes: &[u8]) -> Result<(), MapError> {
+    let meta =
+        MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| MapError::invalid(path, e))?;
+    let mut total = 0;
+    for header in &meta.headers {
+        let size = check_size(path, header.layer_size.width(), header.layer_size.height())?;
+        total += size.area() * header.channels.list.len();
+        // Zip and RLE expand by at most some 1000; B44, PXR24, PIZ and DWA by far less on any real data,
+        // but a constant picture in PIZ can reach more, hence the generous bound.
+        if size.area() / 65_536 > bytes.len() {
+            return Err(MapError::invalid(
+                path,
+                format!(
+                    "is truncated: {} bytes cannot hold {} × {} texels",
+                    bytes.len(),
+                    size.width,
+                    size.height
+                ),
+            ));
+        }
+    }
+    if total > 8 * MAX_TEXELS {
+        return Err(MapError::unsupported(
+            path,
+            format!("claims {total} samples; at most {} are read", 8 * MAX_TEXELS),
+        ));
+    }
+    Ok(())
+}
+
+fn read_image(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
+    check_header(path, bytes)?;
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(|e| MapError::invalid(path, e))?;
+    let layer = image.layer_data;
+    let size = check_size(path, layer.size.width(), layer.size.height())?;
+    let named = |names: &[&str]| -> Option<Vec<&AnyChannel<FlatSamples>>> {
+        let find = |name: &&str| layer.channel_data.list.iter().find(|c| c.name.eq_case_insensitive(name));
+        names.iter().map(find).collect()
+    };
+    let chosen = named(&["R", "G", "B"])
+        .or_else(|| named(&["X", "Y", "Z"]))
+        .or_else(|| named(&["R", "G"]))
+        .or_else(|| named(&["Y"]))
+        .or_else(|| layer.channel_data.list.first().map(|c| vec![c]));
+    let Some(chosen) = chosen else { return Err(MapError::unsupported(path, "has no channels")) };
+    if chosen.iter().any(|c| c.sampling != Vec2(1, 1)) {
+        return Err(MapError::unsupported(path, "has subsampled channels; full resolution is read"));
+    }
+    let mut samples = vec![0.0; size.area() * chosen.len()];
+    for (at, channel) in chosen.iter().enumerate() {
+        for (i, value) in channel.sample_data.values_as_f32().enumerate() {
+            samples[i * chosen.len() + at] = value;
+        }
+    }
+    Image::new(path, size, chosen.len(), Samples::F32(samples))
+}
+
+fn read_ndf(path: &Path, bytes: &[u8]) -> Result<Option<NdfMap>, MapError> {
+    check_header(path, bytes)?;
+    let invalid = |e: ::exr::error::Error| MapError::invalid(path, e);
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(invalid)?;
+    let first = &meta.headers[0];
+    let text =
+        [&first.shared_attributes.other, &first.own_attributes.other].into_iter().find_map(
+            |other| match other.get(&Text::from(KEY)) {
+                Some(AttributeValue::Text(text)) => Some(text.to_string()),
+                _ => None,
+            },
+        );
+    let bumpslopes =
+        BUMPSLOPES.iter().all(|name| first.channels.list.iter().any(|c| c.name.eq_case_insensitive(name)));
+    if text.is_none() && !bumpslopes {
+        return Ok(None);
+    }
+    let header = text.map(|t| Header::from_json(path, &t)).transpose()?;
+    let image = read()
+        .no_deep_data()
+        .all_resolution_levels()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(invalid)?;
+    let layers: Vec<AnyLayer> = image.layer_data.into_iter().collect();
+    if bumpslopes {
+        let wraps = match first.own_attributes.other.get(&Text::from("wrapmodes")) {
+            Some(AttributeValue::Text(text)) => spell_oiio_wraps(&text.to_string()),
+            _ => ["clamp".to_owned(), "clamp".to_owned()],
+        };
+        return read_bumpslopes(path, header, &layers[0], wraps).map(Some);
+    }
+    let Some(header) = header else { return Ok(None) };
+    read_native(path, header, &layers).map(Some)
+}
+
+/// OpenImageIO's `swrap,twrap`; black and mirror are read as clamp, which is what lies nearest.
+fn spell_oiio_wraps(text: &str) -> [String; 2] {
+    let mut words = text.split(',');
+    let mut wrap = || if words.next() == Some("periodic") { "repeat".to_owned() } else { "clamp".to_owned() };
+    [wrap(), wrap()]
+}
+
+/// A channel's values on a level, of the length that the level's size asks for.
+fn level_values(
+    path: &Path,
+    channel: &AnyChannel<Levels<FlatSamples>>,
+    level: usize,
+    size: Size,
+) -> Result<Vec<f32>, MapError> {
+    let samples = match &channel.sample_data {
+        Levels::Singular(samples) if level == 0 => Some(samples),
+        Levels::Mip { rounding_mode: RoundingMode::Down, level_data } => level_data.get(level),
+        _ => None,
+    };
+    let values: Option<Vec<f32>> = samples.map(|s| s.values_as_f32().collect());
+    values.filter(|v| v.len() == size.area()).ok_or_else(|| {
+        let expected = "mip-mapped, rounding down";
+        MapError::invalid(
+            path,
+            format!("lacks level {level} of channel {}; maps are {expected}", channel.name),
+        )
+    })
+}
+
+/// Half when every channel is.
+fn precision_of(layers: &[AnyLayer]) -> Precision {
+    let half = |samples: &Levels<FlatSamples>| match samples {
+        Levels::Singular(FlatSamples::F16(_)) => true,
+        Levels::Mip { level_data, .. } => level_data.iter().all(|s| matches!(s, FlatSamples::F16(_))),
+        _ => false,
+    };
+    let all = layers.iter().flat_map(|l| &l.channel_data.list).all(|c| half(&c.sample_data));
+    if all { Precision::Half } else { Precision::Single }
+}
+
+fn read_native(path: &Path, header: Header, layers: &[AnyLayer]) -> Result<NdfMap, MapError> {
+    let size = check_size(path, header.width, header.height)?;
+    let precision = precision_of(layers);
+    let mut levels = Vec::new();
+    for (level, size) in level_sizes(size).into_iter().enumerate() {
+        let mut bytes = Vec::new();
+        for layer in layers {
+            let mut rgba = vec![0.0; size.area() * 4];
+            for (at, name) in ["R", "G", "B", "A"].iter().enumerate() {
+                let channel = layer.channel_data.list.iter().find(|c| c.name.eq_case_insensitive(name));
+                let channel =
+                    channel.ok_or_else(|| MapError::invalid(path, format!("lacks channel {name}")))?;
+                for (i, value) in level_values(path, channel, level, size)?.into_iter().enumerate() {
+                    rgba[i * 4 + at] = value;
+                }
+            }
+            precision.pack(&rgba, &mut bytes);
+        }
+        levels.push(bytes);
+    }
+    NdfMap::assemble(path, header, precision, levels)
+}
+
+/// What turns our height and slopes into bumpslopes' units: b0 = h × `height`, b1 = x × `s`, b2 = y × `t`.
+struct BumpslopeUnits {
+    height: f32,
+    s: f32,
+    t: f32,
+}
+
+impl BumpslopeUnits {
+    fn of(source: &Source, width: usize) -> Self {
+        match source.kind {
+            SourceKind::Height => {
+                let per_unit = 1.0 / source.height_scale.unwrap_or(1.0) as f32;
+                let per_texel = per_unit / width as f32;
+                Self { height: per_unit, s: per_texel, t: -per_texel }
+            }
+            SourceKind::Normal => {
+                let t = if source.convention.as_deref() == Some("directx") { -1.0 } else { 1.0 };
+                Self { height: 0.0, s: 1.0, t }
+            }
+        }
+    }
+}
+
+fn read_bumpslopes(
+    path: &Path,
+    header: Option<Header>,
+    layer: &AnyLayer,
+    wrap: [String; 2],
+) -> Result<NdfMap, MapError> {
+    let size = check_size(path, layer.size.width(), layer.size.height())?;
+    let channel = |name: &str| {
+        let found = layer.channel_data.list.iter().find(|c| c.name.eq_case_insensitive(name));
+        found.ok_or_else(|| MapError::invalid(path, format!("lacks channel {name}")))
+    };
+    let channels = BUMPSLOPES.map(channel);
+    let mut six = Vec::with_capacity(6);
+    for channel in channels {
+        six.push(channel?);
+    }
+    let header = match header {
+        Some(header) => header,
+        None => {
+            // OpenImageIO writes -1 for the height of what was a normal map.
+            let heights = level_values(path, six[0], 0, size)?;
+            let kind =
+                if heights.iter().all(|h| *h == -1.0) { SourceKind::Normal } else { SourceKind::Height };
+            let (height_scale, convention) = match kind {
+                SourceKind::Height => (Some(1.0), None),
+                SourceKind::Normal => (None, Some("opengl".to_owned())),
+            };
+            let file = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+            let source = Source { file, kind, sha256: String::new(), height_scale, convention };
+            Header {
+                version: VERSION,
+                method: "slopes".to_owned(),
+                width: size.width,
+                height: size.height,
+                wrap,
+                encoding: "sums".to_owned(),
+                attributes: Vec::new(),
+                source,
+                errors: None,
+            }
+        }
+    };
+    let units = BumpslopeUnits::of(&header.source, size.width);
+    // Slopes per texture width are larger than per texel: half floats would overflow sooner.
+    let precision = Precision::Single;
+    let mut levels = Vec::new();
+    for (level, size) in level_sizes(size).into_iter().enumerate() {
+        let mut values = Vec::with_capacity(6);
+        for channel in &six {
+            values.push(level_values(path, channel, level, size)?);
+        }
+        let mut rgba = vec![1.0; size.area() * 8];
+        let (first, second) = rgba.split_at_mut(size.area() * 4);
+        let height = if units.height > 0.0 { 1.0 / units.height } else { 0.0 };
+        for i in 0..size.area() {
+            let b = |c: usize| values[c][i];
+            first[i * 4..][..3].copy_from_slice(&[b(0) * height, b(1) / units.s, b(2) / units.t]);
+            let (ss, tt, st) = (units.s * units.s, units.t * units.t, units.s * units.t);
+            second[i * 4..][..3].copy_from_slice(&[b(3) / ss, b(4) / tt, b(5) / st]);
+        }
+        let mut bytes = Vec::new();
+        precision.pack(&rgba, &mut bytes);
+        levels.push(bytes);
+    }
+    NdfMap::assemble(path, header, precision, levels)
+}
+
+/// Writes the native layout; returns the file's length.
+///
+/// # Errors
+/// [`MapError`] when the file cannot be written.
+pub fn write_native(path: &Path, map: &NdfMap) -> Result<u64, MapError> {
+    let pyramid = &map.pyramid;
+    let layers = (0..pyramid.layers()).map(|layer| {
+        let levels = |channel: usize| mip(pyramid, |level| channel_of(pyramid, level, layer, channel));
+        let channels =
+            ["R", "G", "B", "A"].iter().enumerate().map(|(c, name)| AnyChannel::new(*name, levels(c)));
+        (format!("layer{layer}"), AnyChannels::sort(channels.collect()))
+    });
+    write_layers(path, map, layers.collect())
+}
+
+/// Writes OpenImageIO's six channels; returns the file's length.
+///
+/// # Errors
+/// [`MapError`] when the map's method is not `slopes` or the file cannot be written.
+pub fn write_bumpslopes(path: &Path, map: &NdfMap) -> Result<u64, MapError> {
+    if map.header.method != "slopes" {
+        let reason = format!("the bumpslopes layout holds the method `slopes`, not `{}`", map.header.method);
+        return Err(MapError::unsupported(path, reason));
+    }
+    let pyramid = &map.pyramid;
+    let units = BumpslopeUnits::of(&map.header.source, map.header.width);
+    let is_normal = map.header.source.kind == SourceKind::Normal;
+    // (layer, channel) of our slopes, and its unit.
+    let places = [
+        (0, 0, units.height),
+        (0, 1, units.s),
+        (0, 2, units.t),
+        (1, 0, units.s * units.s),
+        (1, 1, units.t * units.t),
+        (1, 2, units.s * units.t),
+    ];
+    let channel = |(name, (layer, channel, unit)): (&&str, (usize, usize, f32))| {
+        let values = |level| {
+            let mut values = channel_of(pyramid, level, layer, channel);
+            values
+                .iter_mut()
+                .for_each(|v| *v = if is_normal && *name == BUMPSLOPES[0] { -1.0 } else { *v * unit });
+            values
+        };
+        AnyChannel::new(*name, mip(pyramid, values))
+    };
+    let channels = AnyChannels::sort(BUMPSLOPES.iter().zip(places).map(channel).collect());
+    write_layers(path, map, vec![(String::new(), channels)])
+}
+
+fn channel_of(pyramid: &Pyramid, level: usize, layer: usize, channel: usize) -> Vec<f32> {
+    let bytes = pyramid.level_bytes(level);
+    let length = bytes.len() / pyramid.layers();
+    let mut values = Vec::new();
+    pyramid.precision().unpack(&bytes[layer * length..][..length], &mut values);
+    values.into_iter().skip(channel).step_by(4).collect()
+}
+
+fn mip(pyramid: &Pyramid, values: impl Fn(usize) -> Vec<f32>) -> Levels<FlatSamples> {
+    let store = |level| {
+        let values = values(level);
+        match pyramid.precision() {
+            Precision::Half => FlatSamples::F16(values.into_iter().map(f16::from_f32).collect()),
+            Precision::Single => FlatSamples::F32(values),
+        }
+    };
+    Levels::Mip {
+        rounding_mode: RoundingMode::Down,
+        level_data: (0..pyramid.sizes().len()).map(store).collect(),
+    }
+}
+
+fn write_layers(
+    path: &Path,
+    map: &NdfMap,
+    parts: Vec<(String, AnyChannels<Levels<FlatSamples>>)>,
+) -> Result<u64, MapError> {
+    let size = Vec2(map.header.width, map.header.height);
+    let mut attributes = ImageAttributes::new(IntegerBounds::from_dimensions(size));
+    attributes.other.insert(Text::from(KEY), text(&map.header.to_json()));
+    let oiio = |wrap: &String| if wrap == "repeat" { "periodic" } else { "clamp" };
+    let wraps = map.header.wrap.each_ref().map(oiio).join(",");
+    let encoding = Encoding {
+        compression: Compression::ZIP16,
+        blocks: Blocks::Tiles(Vec2(TILE, TILE)),
+        line_order: LineOrder::Increasing,
+    };
+    let layers: ::exr::prelude::Layers<_> = parts
+        .into_iter()
+        .map(|(name, channels)| {
+            let mut own = if name.is_empty() {
+                LayerAttributes::default()
+            } else {
+                LayerAttributes::named(name.as_str())
+            };
+            // So that OpenImageIO's texture system takes the file for a texture and wraps it as it was baked.
+            own.other.insert(Text::from("wrapmodes"), text(&wraps));
+            own.other.insert(Text::from("textureformat"), text("Plain Texture"));
+            Layer::new(size, own, encoding, channels)
+        })
+        .collect();
+    let image = ExrImage { attributes, layer_data: layers };
+    let mut file = AtomicFile::create(path)?;
+    let written = {
+        let mut buffered = std::io::BufWriter::new(file.file());
+        let result = image.write().to_buffered(&mut buffered);
+        result.map_err(|e| MapError::invalid(path, e)).and_then(|()| {
+            buffered.flush().and_then(|()| buffered.stream_position()).map_err(|e| MapError::io(path, e))
+        })
+    }?;
+    let length = file.file().metadata().map_or(written, |m| m.len());
+    file.finish()?;
+    Ok(length)
+}
+
+fn text(text: &str) -> AttributeValue {
+    AttributeValue::Text(Text::from(text))
+}

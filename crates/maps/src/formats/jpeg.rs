@@ -1,0 +1,28 @@
+//! JPEG, baseline and progressive, by the `image` crate.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use ::image::codecs::jpeg::JpegDecoder;
+
+use super::{Format, hdr::read_integers};
+use crate::{Image, MapError};
+
+pub(super) const FORMAT: Format = Format {
+    name: "JPEG",
+    extensions: &["jpg", "jpeg"],
+    magic: &[b"\xFF\xD8\xFF"],
+    read_image: Some(read),
+    read_ndf: None,
+};
+
+fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
+    // The decoder fills what is missing with grey; a map must not come out half invented. A sound file
+    // ends in the end-of-image marker, perhaps padded.
+    let end = bytes.iter().rposition(|b| *b != 0).map_or(0, |last| last + 1);
+    if !bytes[..end].ends_with(&[0xFF, 0xD9]) {
+        return Err(MapError::invalid(path, "is truncated: it does not end in a JPEG end-of-image marker"));
+    }
+    let decoder = JpegDecoder::new(Cursor::new(bytes)).map_err(|e| MapError::invalid(path, e))?;
+    read_integers(path, decoder)
+}

@@ -1,0 +1,76 @@
+//! PNG, 8 and 16 bits, by the `png` crate. A damaged ancillary chunk (colour profile, text) is ignored:
+//! normal maps have no colours to manage.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use ::png::{BitDepth, ColorType, DecodeOptions, Decoder, Limits, Transformations};
+
+use super::Format;
+use crate::image::check_size;
+use crate::{Image, MapError, Samples};
+
+pub(super) const FORMAT: Format = Format {
+    name: "PNG",
+    extensions: &["png"],
+    magic: &[b"\x89PNG\r\n\x1a\n"],
+    read_image: Some(read),
+    read_ndf: None,
+};
+
+/// Deflate cannot shrink below 1/1032 of its output.
+const MAX_DEFLATE_RATIO: usize = 1032;
+
+fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
+    let invalid = |e: ::png::DecodingError| MapError::invalid(path, e);
+    let mut options = DecodeOptions::default();
+    options.set_ignore_iccp_chunk(true);
+    options.set_ignore_text_chunk(true);
+    options.set_skip_ancillary_crc_failures(true);
+    let mut decoder = Decoder::new_with_options(Cursor::new(bytes), options);
+    decoder.set_limits(Limits { bytes: usize::MAX });
+    decoder.set_transformations(Transformations::EXPAND);
+    let mut reader = decoder.read_info().map_err(invalid)?;
+    let info = reader.info();
+    let size = check_size(path, info.width as usize, info.height as usize)?;
+    let length = reader.output_buffer_size().unwrap_or(usize::MAX);
+    if length / MAX_DEFLATE_RATIO > bytes.len() {
+        let reason = format!(
+            "is truncated: {} bytes cannot hold {} × {} texels",
+            bytes.len(),
+            size.width,
+            size.height
+        );
+        return Err(MapError::invalid(path, reason));
+    }
+    let mut buffer = vec![0; length];
+    let frame = reader.next_frame(&mut buffer).map_err(invalid)?;
+    // Data after the picture may be missing; the picture itself is whole here.
+    let channels = match frame.color_type {
+        ColorType::Grayscale => 1,
+        ColorType::GrayscaleAlpha => 2,
+        ColorType::Rgb => 3,
+        ColorType::Rgba => 4,
+        ColorType::Indexed => return Err(MapError::invalid(path, "has a palette that did not expand")),
+    };
+    let samples = match frame.bit_depth {
+        BitDepth::Sixteen => {
+            Samples::U16(buffer.as_chunks::<2>().0.iter().map(|b| u16::from_be_bytes(*b)).collect())
+        }
+        _ => Samples::U8(buffer),
+    };
+    // Grey with alpha is a grey picture: alpha means nothing to a height map.
+    if channels == 2 {
+        Image::new(path, size, 1, first_of_two(samples))
+    } else {
+        Image::new(path, size, channels, samples)
+    }
+}
+
+fn first_of_two(samples: Samples) -> Samples {
+    match samples {
+        Samples::U8(v) => Samples::U8(v.into_iter().step_by(2).collect()),
+        Samples::U16(v) => Samples::U16(v.into_iter().step_by(2).collect()),
+        Samples::F32(v) => Samples::F32(v.into_iter().step_by(2).collect()),
+    }
+}

@@ -1,0 +1,117 @@
+//! The JSON that travels with a normal distribution map, under the key `ndfmap`. See `docs/formats.md`.
+
+use std::path::Path;
+
+use ndfmap_core::surface::{Wrap, Wraps};
+use serde::{Deserialize, Serialize};
+
+use crate::MapError;
+
+/// The version of the header that this code writes, and the highest it reads.
+pub const VERSION: u32 = 1;
+
+/// What a normal distribution map is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// Version of this header.
+    pub version: u32,
+    /// The method's spelling.
+    pub method: String,
+    /// Texels in a row of level 0.
+    pub width: usize,
+    /// Rows of level 0.
+    pub height: usize,
+    /// `repeat` or `clamp`, along rows and along columns.
+    pub wrap: [String; 2],
+    /// What the channels are: `sums`, or for `ndm` `sums-about-pole`.
+    pub encoding: String,
+    /// Names of attributes carried by each lobe; none for linear methods.
+    pub attributes: Vec<String>,
+    /// What it was baked from.
+    pub source: Source,
+    /// Errors measured against the source, when they were.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub errors: Option<Vec<Measured>>,
+}
+
+/// What a map was baked from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Source {
+    /// File name without folders, or `builtin:NAME`.
+    pub file: String,
+    /// Normals or heights.
+    pub kind: SourceKind,
+    /// SHA-256 of the file, in hexadecimal; empty for built-in maps.
+    pub sha256: String,
+    /// Texture widths per unit of height, for heights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height_scale: Option<f64>,
+    /// `opengl` or `directx`, for normals: which way the file's green pointed. The map is always y up.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub convention: Option<String>,
+}
+
+/// Whether a source holds normals or heights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SourceKind {
+    /// A normal map.
+    Normal,
+    /// A height map.
+    Height,
+}
+
+/// One measured error.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// The BRDF's spelling.
+    pub brdf: String,
+    /// The level.
+    pub level: usize,
+    /// Relative L2 error.
+    pub error: f64,
+}
+
+impl Header {
+    /// Spells [`Wraps`].
+    #[must_use]
+    pub fn spell_wraps(wraps: Wraps) -> [String; 2] {
+        [wraps.x, wraps.y].map(|w| match w {
+            Wrap::Repeat => "repeat".to_owned(),
+            Wrap::Clamp => "clamp".to_owned(),
+        })
+    }
+
+    /// The [`Wraps`] that are spelled.
+    ///
+    /// # Errors
+    /// [`MapError`] for any other word.
+    pub fn wraps(&self, path: &Path) -> Result<Wraps, MapError> {
+        let wrap = |word: &str| match word {
+            "repeat" => Ok(Wrap::Repeat),
+            "clamp" => Ok(Wrap::Clamp),
+            other => Err(MapError::invalid(path, format!("its header has the unknown wrap `{other}`"))),
+        };
+        Ok(Wraps { x: wrap(&self.wrap[0])?, y: wrap(&self.wrap[1])? })
+    }
+
+    /// The JSON text.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        serde_json::to_string(self).unwrap_or_else(|e| unreachable!("a header has string keys only: {e}"))
+    }
+
+    /// Reads the JSON text.
+    ///
+    /// # Errors
+    /// [`MapError`] when it is no header, or a newer one.
+    pub fn from_json(path: &Path, text: &str) -> Result<Self, MapError> {
+        let header: Self = serde_json::from_str(text)
+            .map_err(|e| MapError::invalid(path, format!("its `ndfmap` key cannot be read: {e}")))?;
+        if header.version > VERSION {
+            let reason = format!("has header version {}; this program reads up to {VERSION}", header.version);
+            return Err(MapError::unsupported(path, reason));
+        }
+        Ok(header)
+    }
+}

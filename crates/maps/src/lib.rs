@@ -1,0 +1,18 @@
+//! ndfmap-maps: files in and out, and what their channels mean.
+//!
+//! Two things come out of files. A **source** ([`source`]) is a picture read as a surface: a normal map
+//! or a height map, in any of the formats of [`formats::TABLE`]. A **normal distribution map**
+//! ([`NdfMap`]) is what a bake makes: a stored pyramid and a [`Header`] that says what it holds.
+
+pub mod atomic;
+mod error;
+pub mod formats;
+mod header;
+mod image;
+mod ndf_map;
+pub mod source;
+
+pub use error::MapError;
+pub use header::{Header, Measured, Source, SourceKind, VERSION};
+pub use image::{Image, MAX_SIDE, MAX_TEXELS, Samples};
+pub use ndf_map::NdfMap;

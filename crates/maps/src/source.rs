@@ -1,0 +1,327 @@
+//! Sources: pictures, and built-in surfaces, read as normal maps or height maps.
+
+use std::path::Path;
+
+use glam::Vec3;
+use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::procedural;
+use ndfmap_core::surface::{HeightField, SlopeFilter, Surface, SurfaceRow, Wraps, integrability, unit_or_up};
+use sha2::{Digest, Sha256};
+
+use crate::formats::{read_file, read_image};
+use crate::header::{Source, SourceKind};
+use crate::{Image, MapError, Samples};
+
+/// Which way green points in a normal map.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Convention {
+    /// Up the picture.
+    #[default]
+    OpenGl,
+    /// Down the picture.
+    DirectX,
+}
+
+impl Convention {
+    /// As spelled on the command line and in headers.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OpenGl => "opengl",
+            Self::DirectX => "directx",
+        }
+    }
+}
+
+/// How to take a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SourceOptions {
+    /// Normals or heights; `None` decides by the picture: grey ones are heights.
+    pub kind: Option<SourceKind>,
+    /// For normal maps.
+    pub convention: Convention,
+    /// For height maps: texture widths that one unit of height stands for (full white of an integer
+    /// picture is one unit).
+    pub height_scale: f64,
+    /// For height maps: white is deep.
+    pub invert: bool,
+    /// For height maps.
+    pub slope_filter: SlopeFilter,
+    /// What lies beyond the edges.
+    pub wraps: Wraps,
+    /// Size of a built-in surface.
+    pub builtin_size: Size,
+}
+
+/// Height of full white, in texture widths, when nobody says.
+pub const DEFAULT_HEIGHT_SCALE: f64 = 0.05;
+
+impl Default for SourceOptions {
+    fn default() -> Self {
+        Self {
+            kind: None,
+            convention: Convention::default(),
+            height_scale: DEFAULT_HEIGHT_SCALE,
+            invert: false,
+            slope_filter: SlopeFilter::default(),
+            wraps: Wraps::default(),
+            builtin_size: Size { width: 512, height: 512 },
+        }
+    }
+}
+
+/// A source, ready to be baked.
+pub struct SourceMap {
+    /// The finest level.
+    pub surface: Box<dyn Surface>,
+    /// What it is, for headers.
+    pub source: Source,
+    /// What was odd about it.
+    pub warnings: Vec<String>,
+}
+
+/// What built-in surfaces are called: this and a name.
+pub const BUILTIN_PREFIX: &str = "builtin:";
+
+/// Below this signed [`integrability`] a map contradicts its convention; at what real maps reach when
+/// nothing can be said (0.22, linen) it must stay silent.
+const CONTRADICTION: f64 = -0.25;
+
+/// Reads `map`: a file, or `builtin:NAME`.
+///
+/// # Errors
+/// [`MapError`] when there is no such surface, or the file cannot be read.
+pub fn read_source(map: &Path, options: &SourceOptions) -> Result<SourceMap, MapError> {
+    if let Some(name) = map.to_str().and_then(|m| m.strip_prefix(BUILTIN_PREFIX)) {
+        return builtin(map, name, options);
+    }
+    let bytes = read_file(map)?;
+    let image = read_image(map, &bytes)?;
+    let sha256 = Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect();
+    drop(bytes);
+    source_of_image(map, image, sha256, options)
+}
+
+fn builtin(map: &Path, name: &str, options: &SourceOptions) -> Result<SourceMap, MapError> {
+    let row = procedural::find(name).ok_or_else(|| {
+        let names: Vec<&str> = procedural::TABLE.iter().map(|row| row.name).collect();
+        MapError::unsupported(
+            map,
+            format!("there is no built-in surface `{name}`; there are {}", names.join(", ")),
+        )
+    })?;
+    let surface = (row.build)(options.builtin_size);
+    let (kind, height_scale, convention) = if surface.has_height() {
+        (SourceKind::Height, Some(1.0), None)
+    } else {
+        (SourceKind::Normal, None, Some(Convention::OpenGl.name().to_owned()))
+    };
+    let source = Source {
+        file: format!("{BUILTIN_PREFIX}{name}"),
+        kind,
+        sha256: String::new(),
+        height_scale,
+        convention,
+    };
+    Ok(SourceMap { surface, source, warnings: Vec::new() })
+}
+
+/// Takes a decoded picture as a surface.
+///
+/// # Errors
+/// [`MapError`] when it cannot be what it is said to be.
+pub fn source_of_image(
+    path: &Path,
+    image: Image,
+    sha256: String,
+    options: &SourceOptions,
+) -> Result<SourceMap, MapError> {
+    let mut warnings = image.warnings.clone();
+    let kind =
+        options.kind.unwrap_or_else(|| if is_grey(&image) { SourceKind::Height } else { SourceKind::Normal });
+    let file = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let (surface, height_scale, convention): (Box<dyn Surface>, _, _) = match kind {
+        SourceKind::Height => {
+            if options.kind.is_none() && image.channels > 1 {
+                warnings.push(
+                    "is grey, so it is taken as heights; `--from normal` takes it as normals".to_owned(),
+                );
+            }
+            let field = height_field(path, &image, options, &mut warnings)?;
+            (Box::new(field), Some(options.height_scale), None)
+        }
+        SourceKind::Normal => {
+            let normals = EncodedNormals::new(path, image, options, &mut warnings)?;
+            (Box::new(normals), None, Some(options.convention.name().to_owned()))
+        }
+    };
+    Ok(SourceMap { surface, source: Source { file, kind, sha256, height_scale, convention }, warnings })
+}
+
+/// True for one channel, or three that never part by more than JPEG's colour noise (8 of 255).
+fn is_grey(image: &Image) -> bool {
+    if image.channels < 3 {
+        return image.channels == 1;
+    }
+    let texel = |i: usize| [0, 1, 2].map(|c| image.samples.get(i * image.channels + c));
+    (0..image.size.area()).map(texel).all(|[r, g, b]| r.max(g).max(b) - r.min(g).min(b) <= 8.0 / 255.0)
+}
+
+fn height_field(
+    path: &Path,
+    image: &Image,
+    options: &SourceOptions,
+    warnings: &mut Vec<String>,
+) -> Result<HeightField, MapError> {
+    // Scaling by the full range keeps depth positive for integers; measurements are only negated.
+    let one = if matches!(image.samples, Samples::F32(_)) { 0.0 } else { 1.0 };
+    let scale = options.height_scale as f32;
+    let mut bad = 0;
+    let height = |x: usize, y: usize| {
+        let h = image.samples.get((y * image.size.width + x) * image.channels);
+        let h = if options.invert { one - h } else { h } * scale;
+        if h.is_finite() {
+            h
+        } else {
+            bad += 1;
+            0.0
+        }
+    };
+    let heights = Grid::from_fn(image.size, height);
+    if bad == image.size.area() {
+        return Err(MapError::invalid(path, "holds no finite height"));
+    }
+    if bad > 0 {
+        warnings.push(format!("{bad} texels are NaN or infinite and take height 0"));
+    }
+    Ok(HeightField { heights, wraps: options.wraps, filter: options.slope_filter })
+}
+
+/// A normal map in the precision of its file, decoded a row at a time.
+struct EncodedNormals {
+    image: Image,
+    wraps: Wraps,
+    /// z is rebuilt from x and y.
+    two_channels: bool,
+    /// Stored values run from 0 to 1 and stand for -1 to 1.
+    positive: bool,
+    /// 1, or -1 to turn DirectX's green.
+    green: f32,
+}
+
+impl EncodedNormals {
+    fn new(
+        path: &Path,
+        image: Image,
+        options: &SourceOptions,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self, MapError> {
+        if image.channels < 2 {
+            return Err(MapError::unsupported(
+                path,
+                "has one channel: no normal map. `--from height` takes it as heights",
+            ));
+        }
+        let texels = || 0..image.size.area();
+        let sample = |i: usize, c: usize| image.samples.get(i * image.channels + c);
+        let no_blue = image.channels > 2 && texels().all(|i| sample(i, 2) == 0.0);
+        if no_blue {
+            warnings.push("has no blue: z is rebuilt from red and green".to_owned());
+        }
+        let positive = match &image.samples {
+            Samples::F32(values) => !values.iter().any(|v| *v < 0.0),
+            _ => true,
+        };
+        let green = match options.convention {
+            Convention::OpenGl => 1.0,
+            Convention::DirectX => -1.0,
+        };
+        let normals = Self {
+            two_channels: image.channels == 2 || no_blue,
+            wraps: options.wraps,
+            positive,
+            green,
+            image,
+        };
+        normals.look_over(options.convention, warnings);
+        Ok(normals)
+    }
+
+    /// Counts what is no normal, and asks whether the convention can be right.
+    fn look_over(&self, convention: Convention, warnings: &mut Vec<String>) {
+        let texels = self.image.size.area();
+        let mut row = SurfaceRow::flat(self.image.size.width);
+        let (mut black, mut broken, mut below) = (0, 0, 0);
+        for y in 0..self.image.size.height {
+            self.read_row(y, &mut row);
+            below += row.z.iter().filter(|z| **z <= 0.0).count();
+            for i in 0..self.image.size.width {
+                let stored = self.stored(y, i);
+                black += usize::from(stored == Vec3::ZERO);
+                broken += usize::from(!stored.is_finite());
+            }
+        }
+        let percent = |n: usize| 100.0 * n as f64 / texels as f64;
+        let mut say = |n: usize, what: &str| {
+            if n > 0 {
+                warnings.push(format!("{n} texels ({:.2} %) {what}", percent(n)));
+            }
+        };
+        // Black in two channels is a legal, if steep, normal.
+        say(if self.two_channels { 0 } else { black }, "are black, no direction, and become (0, 0, 1)");
+        say(broken, "are NaN or infinite and become (0, 0, 1)");
+        say(below, "point to or below the horizon; their slopes are held to 255");
+        let agreement = integrability(self);
+        if agreement < CONTRADICTION {
+            let other = match convention {
+                Convention::OpenGl => Convention::DirectX,
+                Convention::DirectX => Convention::OpenGl,
+            };
+            warnings.push(format!(
+                "looks like a {} map (integrability {agreement:.2} as {}): try `--convention {}`",
+                other.name(),
+                convention.name(),
+                other.name()
+            ));
+        }
+    }
+
+    /// The three samples of a texel as they are in the file.
+    #[inline]
+    fn stored(&self, y: usize, x: usize) -> Vec3 {
+        let at = (y * self.image.size.width + x) * self.image.channels;
+        let blue = if self.image.channels > 2 { self.image.samples.get(at + 2) } else { 0.0 };
+        Vec3::new(self.image.samples.get(at), self.image.samples.get(at + 1), blue)
+    }
+
+    /// The unit normal of a stored vector.
+    #[inline]
+    fn decode(&self, stored: Vec3) -> Vec3 {
+        if stored == Vec3::ZERO && !self.two_channels {
+            return Vec3::Z;
+        }
+        let mut v = if self.positive { stored * 2.0 - 1.0 } else { stored };
+        if self.two_channels {
+            v.z = (1.0 - v.x * v.x - v.y * v.y).max(0.0).sqrt();
+        }
+        v.y *= self.green;
+        unit_or_up(v)
+    }
+}
+
+impl Surface for EncodedNormals {
+    fn size(&self) -> Size {
+        self.image.size
+    }
+
+    fn wraps(&self) -> Wraps {
+        self.wraps
+    }
+
+    fn read_row(&self, y: usize, row: &mut SurfaceRow) {
+        row.height.fill(0.0);
+        for x in 0..self.image.size.width {
+            row.set_normal(x, self.decode(self.stored(y, x)));
+        }
+    }
+}
