@@ -1,0 +1,185 @@
+//! Arguments that several commands take, and how they are read.
+
+use clap::{Args, ValueEnum};
+use ndfmap_core::brdf::{self, ParseBrdfError};
+use ndfmap_core::grid::Size;
+use ndfmap_core::ndf::{self, Method, ParseMethodError};
+use ndfmap_core::pyramid;
+use ndfmap_core::surface::{SlopeFilter, Wrap, Wraps};
+use ndfmap_maps::SourceKind;
+use ndfmap_maps::source::{Convention, DEFAULT_HEIGHT_SCALE, SourceOptions};
+
+/// How to take the source map.
+#[derive(Debug, Args)]
+pub(super) struct SourceArguments {
+    /// Take the map as normals or as heights [default: grey pictures are heights]
+    #[arg(long, value_enum)]
+    from: Option<From>,
+    /// Which way green points in a normal map: up (opengl) or down (directx)
+    #[arg(long, value_enum, default_value_t = ConventionArgument::Opengl)]
+    convention: ConventionArgument,
+    /// Height of one unit (full white), in texture widths
+    #[arg(long, value_name = "S", default_value_t = DEFAULT_HEIGHT_SCALE, value_parser = positive, allow_negative_numbers = true)]
+    height_scale: f64,
+    /// White is deep: the height map is a depth map
+    #[arg(long)]
+    invert: bool,
+    /// How slopes are taken from heights
+    #[arg(long, value_enum, default_value_t = FilterArgument::Central)]
+    slope_filter: FilterArgument,
+    /// What lies beyond the edges: `repeat`, `clamp`, or one for each axis as in `repeat,clamp`
+    #[arg(long, value_name = "X[,Y]", default_value = "repeat", value_parser = wraps)]
+    wrap: Wraps,
+    /// Size of a built-in map, as in 512 or 640x480
+    #[arg(long, value_name = "SIZE", default_value = "512", value_parser = size)]
+    size: Size,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum From {
+    Normal,
+    Height,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum ConventionArgument {
+    Opengl,
+    Directx,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum FilterArgument {
+    Central,
+    Sobel,
+}
+
+impl SourceArguments {
+    pub(super) fn options(&self) -> SourceOptions {
+        SourceOptions {
+            kind: self.from.map(|from| match from {
+                From::Normal => SourceKind::Normal,
+                From::Height => SourceKind::Height,
+            }),
+            convention: match self.convention {
+                ConventionArgument::Opengl => Convention::OpenGl,
+                ConventionArgument::Directx => Convention::DirectX,
+            },
+            height_scale: self.height_scale,
+            invert: self.invert,
+            slope_filter: match self.slope_filter {
+                FilterArgument::Central => SlopeFilter::CentralDifference,
+                FilterArgument::Sobel => SlopeFilter::Sobel,
+            },
+            wraps: self.wrap,
+            builtin_size: self.size,
+        }
+    }
+}
+
+/// Bits of a stored channel.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(super) enum Precision {
+    /// 16-bit floats
+    #[default]
+    Half,
+    /// 32-bit floats
+    Single,
+}
+
+impl std::convert::From<Precision> for pyramid::Precision {
+    fn from(p: Precision) -> Self {
+        match p {
+            Precision::Half => Self::Half,
+            Precision::Single => Self::Single,
+        }
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(v) if v.is_finite() && v > 0.0 => Ok(v),
+        _ => Err("must be a number above 0".to_owned()),
+    }
+}
+
+fn wraps(text: &str) -> Result<Wraps, String> {
+    let wrap = |word: &str| match word {
+        "repeat" => Ok(Wrap::Repeat),
+        "clamp" => Ok(Wrap::Clamp),
+        other => Err(format!("`{other}` is neither `repeat` nor `clamp`")),
+    };
+    match text.split(',').collect::<Vec<_>>()[..] {
+        [both] => Ok(Wraps { x: wrap(both)?, y: wrap(both)? }),
+        [x, y] => Ok(Wraps { x: wrap(x)?, y: wrap(y)? }),
+        _ => Err("one word for both axes, or one for each".to_owned()),
+    }
+}
+
+/// Largest side of a built-in map.
+const MAX_BUILTIN: usize = 8192;
+
+fn size(text: &str) -> Result<Size, String> {
+    let side = |t: &str| match t.parse::<usize>() {
+        Ok(n @ 1..=MAX_BUILTIN) => Ok(n),
+        _ => Err(format!("`{t}` is no side from 1 to {MAX_BUILTIN}")),
+    };
+    match text.split_once('x') {
+        Some((w, h)) => Ok(Size { width: side(w)?, height: side(h)? }),
+        None => side(text).map(|n| Size { width: n, height: n }),
+    }
+}
+
+/// Checks a method's spelling; an unknown one suggests the nearest.
+pub(super) fn method_spelling(text: &str) -> Result<String, String> {
+    match ndf::parse(text) {
+        Ok(_) => Ok(text.to_owned()),
+        Err(ParseMethodError::Unknown(name)) => Err(unknown(&name, ndf::TABLE.iter().map(|r| r.name))),
+        Err(other) => Err(other.to_string()),
+    }
+}
+
+/// Checks a BRDF's spelling; an unknown one suggests the nearest.
+pub(super) fn brdf_spelling(text: &str) -> Result<String, String> {
+    match brdf::parse(text) {
+        Ok(_) => Ok(text.to_owned()),
+        Err(ParseBrdfError::Unknown(name)) => Err(unknown(&name, brdf::TABLE.iter().map(|r| r.name))),
+        Err(other) => Err(other.to_string()),
+    }
+}
+
+fn unknown(name: &str, known: impl Iterator<Item = &'static str> + Clone) -> String {
+    let nearest =
+        known.clone().max_by(|a, b| strsim::jaro_winkler(name, a).total_cmp(&strsim::jaro_winkler(name, b)));
+    let all = known.collect::<Vec<_>>().join(", ");
+    match nearest {
+        Some(nearest) => format!("there is no `{name}`; did you mean `{nearest}`? There are {all}"),
+        None => format!("there is no `{name}`"),
+    }
+}
+
+/// Every name of a table with its parameters and summary, for `--help`.
+pub(super) fn methods_help() -> String {
+    let rows =
+        ndf::TABLE.iter().map(|r| format!("  {}{}\n      {} ({})", r.name, r.parameters, r.summary, r.paper));
+    format!(
+        "Methods:\n{}\n\nBuilt-in maps (`builtin:NAME`):\n{}",
+        rows.collect::<Vec<_>>().join("\n"),
+        builtin_help()
+    )
+}
+
+fn builtin_help() -> String {
+    let rows = ndfmap_core::procedural::TABLE.iter().map(|r| format!("  {:12} {}", r.name, r.summary));
+    rows.collect::<Vec<_>>().join("\n")
+}
+
+/// Every BRDF with its parameter and summary, for `--help`.
+pub(super) fn brdfs_help() -> String {
+    let rows = brdf::TABLE.iter().map(|r| format!("  {}{}\n      {}", r.name, r.parameter, r.summary));
+    format!("BRDFs:\n{}", rows.collect::<Vec<_>>().join("\n"))
+}
+
+/// The method of a checked spelling.
+pub(super) fn method(spelling: &str) -> Result<Box<dyn Method>, crate::Failure> {
+    ndf::parse(spelling).map_err(|e| crate::Failure::Usage(e.to_string()))
+}

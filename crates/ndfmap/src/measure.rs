@@ -1,0 +1,135 @@
+//! Bakes a surface with several methods and measures each against the truth, level by level.
+
+use std::time::Instant;
+
+use ndfmap_core::bake::Bake;
+use ndfmap_core::brdf::Brdf;
+use ndfmap_core::error::{Truth, lattice_for, level_error, true_levels};
+use ndfmap_core::grid::Size;
+use ndfmap_core::ndf::Method;
+use ndfmap_core::pyramid::{Precision, Pyramid, level_sizes};
+use ndfmap_core::surface::Surface;
+use serde_json::{Map, Value, json};
+
+use crate::progress::Progress;
+
+/// What is compared.
+pub(crate) struct Subject<'a> {
+    pub(crate) surface: &'a dyn Surface,
+    pub(crate) brdf: &'a dyn Brdf,
+    pub(crate) methods: &'a [Box<dyn Method>],
+    pub(crate) precision: Precision,
+}
+
+/// One method's map and its errors.
+pub(crate) struct Row {
+    pub(crate) method: String,
+    pub(crate) bytes_per_texel: usize,
+    pub(crate) bake_seconds: f64,
+    pub(crate) pyramid: Pyramid,
+    /// One a level, finest first.
+    pub(crate) errors: Vec<f64>,
+}
+
+/// Everything that was measured.
+pub(crate) struct Comparison {
+    pub(crate) brdf: String,
+    pub(crate) sizes: Vec<Size>,
+    pub(crate) rows: Vec<Row>,
+}
+
+/// Bakes and measures.
+pub(crate) fn compare(subject: &Subject<'_>) -> Comparison {
+    let lattice = lattice_for(subject.brdf);
+    let truths = {
+        let progress = Progress::new("truth");
+        let truth = Truth::new(subject.surface, subject.brdf, &lattice);
+        true_levels(&truth, &|f| progress.set(f))
+    };
+    let mut rows = Vec::new();
+    for method in subject.methods {
+        let progress = Progress::new(&method.spelling());
+        let start = Instant::now();
+        let bake = Bake {
+            surface: subject.surface,
+            method: &**method,
+            precision: subject.precision,
+            progress: &|f| progress.set(f),
+        };
+        let (pyramid, _) = bake.to_pyramid();
+        let bake_seconds = start.elapsed().as_secs_f64();
+        let error = |truth| level_error(&pyramid, &**method, subject.brdf, &lattice, truth);
+        let errors = truths.iter().map(error).collect();
+        let bytes_per_texel = method.layers() * subject.precision.texel_bytes();
+        rows.push(Row { method: method.spelling(), bytes_per_texel, bake_seconds, pyramid, errors });
+    }
+    Comparison { brdf: subject.brdf.spelling(), sizes: level_sizes(subject.surface.size()), rows }
+}
+
+impl Comparison {
+    /// The JSON of `compare --json`.
+    pub(crate) fn to_json(&self, map: &str) -> Value {
+        let methods: Map<String, Value> = self
+            .rows
+            .iter()
+            .map(|row| {
+                let level = |(level, error): (usize, &f64)| json!({ "level": level, "error": error });
+                let levels: Vec<Value> = row.errors.iter().enumerate().map(level).collect();
+                let value = json!({
+                    "bytes_per_texel": row.bytes_per_texel,
+                    "bake_seconds": row.bake_seconds,
+                    "levels": levels,
+                });
+                (row.method.clone(), value)
+            })
+            .collect();
+        json!({
+            "map": map,
+            "width": self.sizes[0].width,
+            "height": self.sizes[0].height,
+            "brdf": self.brdf,
+            "methods": methods,
+        })
+    }
+
+    /// The table for a terminal: a row a method, a column a level.
+    pub(crate) fn to_table(&self) -> String {
+        let name = self.rows.iter().map(|r| r.method.len()).max().unwrap_or(0).max("level".len());
+        let mut text =
+            format!("relative L2 error of the effective lobe against the truth, {}\n\n", self.brdf);
+        text += &format!("{:name$}  bytes  bake ms", "level");
+        for (level, _) in self.sizes.iter().enumerate() {
+            text += &format!(" {level:>6}");
+        }
+        text += &format!("\n{:name$}               ", "size");
+        for size in &self.sizes {
+            text += &format!(
+                " {:>6}",
+                if size.width == size.height {
+                    size.width.to_string()
+                } else {
+                    format!("{}x{}", size.width, size.height)
+                }
+            );
+        }
+        text.push('\n');
+        for row in &self.rows {
+            text +=
+                &format!("{:name$} {:>6} {:>8.1}", row.method, row.bytes_per_texel, row.bake_seconds * 1e3);
+            for error in &row.errors {
+                text += &format!(" {:>6}", three_digits(*error));
+            }
+            text.push('\n');
+        }
+        text
+    }
+}
+
+/// A number in six columns, three significant digits where it matters.
+pub(crate) fn three_digits(value: f64) -> String {
+    match value {
+        v if v < 0.0005 => format!("{v:.0e}"),
+        v if v < 10.0 => format!("{v:.3}"),
+        v => format!("{v:.1}"),
+    }
+}

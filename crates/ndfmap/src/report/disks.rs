@@ -1,0 +1,102 @@
+//! What the normals under one texel do, drawn on the unit disk: the truth beside every method.
+
+use glam::Vec3;
+use ndfmap_core::brdf;
+use ndfmap_core::error::Truth;
+use ndfmap_core::grid::Size;
+use ndfmap_core::ndf;
+use ndfmap_core::sphere::DiskLattice;
+
+use super::canvas::{Canvas, INK, LETTER, LINE, PAPER, Rgb};
+use crate::measure::{Comparison, Subject};
+
+/// Points of the lattice a side, and pixels a point.
+const SIDE: usize = 72;
+const SCALE: usize = 2;
+
+/// The normals are drawn as a sharp lobe would show them, so that all methods draw the same thing.
+const PEN: &str = "blinn-phong:200";
+
+/// Texels drawn: at these levels, the one whose normals stray most.
+const LEVELS: [usize; 3] = [3, 5, 7];
+
+/// Draws the disks: a row a level, a column a method.
+pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Canvas {
+    let pen = brdf::parse(PEN).unwrap_or_else(|e| unreachable!("the pen is a constant: {e}"));
+    let lattice = DiskLattice::new(SIDE, 0.99);
+    let truth = Truth::new(subject.surface, &*pen, &lattice);
+    let last = comparison.sizes.len() - 1;
+    let mut levels: Vec<usize> = LEVELS.iter().map(|l| *l.min(&last)).collect();
+    levels.dedup();
+    let disk = SIDE * SCALE;
+    let (label, step_x, step_y) = (11 * LETTER, disk.max(23 * LETTER) + 8, disk + LINE);
+    let mut canvas =
+        Canvas::new(label + (comparison.rows.len() + 1) * step_x, 2 * LINE + levels.len() * step_y);
+    canvas.text(label, 8, "truth");
+    for (column, row) in comparison.rows.iter().enumerate() {
+        canvas.text(label + (column + 1) * step_x, 8, &row.method);
+    }
+    for (at, level) in levels.iter().enumerate() {
+        let y = 2 * LINE + at * step_y;
+        let size = comparison.sizes[*level];
+        let texel = busiest(subject, size);
+        canvas.text(8, y + 8, &format!("level {level}"));
+        canvas.text(8, y + 8 + LINE, &format!("({},{})", texel.0, texel.1));
+        let true_lobe = truth.texel(size, texel.0, texel.1);
+        // Square root spreads the dark end; the truth's peak is white, and what exceeds it is too.
+        let peak = true_lobe.iter().copied().fold(1e-12, f64::max);
+        plot(&mut canvas, &lattice, (label, y), &true_lobe, peak);
+        for (column, row) in comparison.rows.iter().enumerate() {
+            let Ok(method) = ndf::parse(&row.method) else { continue };
+            let mut lobe = vec![0.0; lattice.len()];
+            method
+                .evaluator(&*pen, &lattice.directions)
+                .evaluate(&row.pyramid.texel(*level, texel.0, texel.1), &mut lobe);
+            plot(&mut canvas, &lattice, (label + (column + 1) * step_x, y), &lobe, peak);
+        }
+    }
+    canvas
+}
+
+/// The texel of a level whose mean normal is shortest.
+fn busiest(subject: &Subject<'_>, size: Size) -> (usize, usize) {
+    use ndfmap_core::bake::Bake;
+    use ndfmap_core::ndf::Toksvig;
+    let bake = Bake {
+        surface: subject.surface,
+        method: &Toksvig,
+        precision: ndfmap_core::pyramid::Precision::Single,
+        progress: &|_| (),
+    };
+    let (pyramid, _) = bake.to_pyramid();
+    let level = pyramid.sizes().iter().position(|s| *s == size).unwrap_or(0);
+    let length = |(x, y): &(usize, usize)| Vec3::from_slice(&pyramid.texel(level, *x, *y)).length();
+    let texels = (0..size.area()).map(|i| (i % size.width, i / size.width));
+    texels.min_by(|a, b| length(a).total_cmp(&length(b))).unwrap_or((0, 0))
+}
+
+fn plot(canvas: &mut Canvas, lattice: &DiskLattice, (x0, y0): (usize, usize), lobe: &[f64], peak: f64) {
+    let pixel = |c: f64| ((c + 1.0) / 2.0 * SIDE as f64) as usize;
+    for (w, value) in lattice.directions.iter().zip(lobe) {
+        let colour = heat((value / peak).clamp(0.0, 1.0).sqrt());
+        // y is up on the disk, down on the picture.
+        let (i, j) = (pixel(w.x), SIDE - 1 - pixel(w.y));
+        for dy in 0..SCALE {
+            for dx in 0..SCALE {
+                canvas.set(x0 + i * SCALE + dx, y0 + j * SCALE + dy, colour);
+            }
+        }
+    }
+}
+
+/// Dark to light in one hue order: readable in grey and by the colour-blind.
+fn heat(t: f64) -> Rgb {
+    const STOPS: [Rgb; 5] = [INK, [60, 40, 120], [190, 55, 90], [250, 150, 60], PAPER];
+    let at = t * (STOPS.len() - 1) as f64;
+    let i = (at as usize).min(STOPS.len() - 2);
+    let mix = |c: usize| {
+        let (a, b) = (f64::from(STOPS[i][c]), f64::from(STOPS[i + 1][c]));
+        (a + (b - a) * (at - i as f64)).round() as u8
+    };
+    [mix(0), mix(1), mix(2)]
+}

@@ -1,0 +1,74 @@
+//! Error by level for every method, as SVG.
+
+use plotters::prelude::{
+    BLACK, ChartBuilder, Circle, Color, EmptyElement, IntoDrawingArea, IntoLogRange, LineSeries, PathElement,
+    RGBColor, SVGBackend, SeriesLabelPosition, WHITE,
+};
+use plotters::series::PointSeries;
+use plotters::style::ShapeStyle;
+
+use crate::Failure;
+use crate::measure::Comparison;
+
+/// Okabe and Ito's colours, told apart by the colour-blind too; after eight they start again.
+const COLOURS: [RGBColor; 8] = [
+    RGBColor(0, 0, 0),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(0, 158, 115),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 114, 178),
+    RGBColor(204, 121, 167),
+    RGBColor(150, 150, 150),
+];
+
+/// Errors below this are drawn on the floor: nothing to see there but rounding.
+const FLOOR: f64 = 1e-4;
+
+/// The plot.
+pub(super) fn errors_by_level(comparison: &Comparison) -> Result<String, Failure> {
+    let mut svg = String::new();
+    draw(comparison, &mut svg).map_err(|e| Failure::Failed(format!("cannot draw the plot: {e}")))?;
+    Ok(svg)
+}
+
+fn draw(comparison: &Comparison, svg: &mut String) -> Result<(), Box<dyn std::error::Error>> {
+    let last = comparison.sizes.len() - 1;
+    let worst = comparison.rows.iter().flat_map(|r| &r.errors).copied().fold(1.0, f64::max);
+    let area = SVGBackend::with_string(svg, (860, 460)).into_drawing_area();
+    area.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&area)
+        .margin(12)
+        .x_label_area_size(40)
+        .y_label_area_size(60)
+        .build_cartesian_2d(-0.2..last as f64 + 0.2, (FLOOR..worst * 1.5).log_scale())?;
+    chart
+        .configure_mesh()
+        .x_desc("level (0 is the map itself)")
+        .y_desc("relative L2 error")
+        .x_labels(last + 1)
+        .x_label_formatter(&|x| format!("{x:.0}"))
+        .y_label_formatter(&|y| if *y < 0.01 { format!("{y:.0e}") } else { format!("{y}") })
+        .light_line_style(BLACK.mix(0.06))
+        .draw()?;
+    for (at, row) in comparison.rows.iter().enumerate() {
+        let colour = COLOURS[at % COLOURS.len()];
+        let style: ShapeStyle = colour.stroke_width(2);
+        let points = || row.errors.iter().enumerate().map(|(l, e)| (l as f64, e.max(FLOOR)));
+        chart
+            .draw_series(LineSeries::new(points(), style))?
+            .label(row.method.clone())
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
+        chart.draw_series(PointSeries::of_element(points(), 3, colour.filled(), &|at, size, style| {
+            EmptyElement::at(at) + Circle::new((0, 0), size, style)
+        }))?;
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::LowerRight)
+        .background_style(WHITE.mix(0.85))
+        .border_style(BLACK.mix(0.3))
+        .draw()?;
+    area.present()?;
+    Ok(())
+}

@@ -1,0 +1,103 @@
+//! The contact sheet: the map under one light at growing distances, the truth beside every method.
+
+use glam::DVec3;
+use ndfmap_core::error::Truth;
+use ndfmap_core::grid::Size;
+use ndfmap_core::ndf;
+use ndfmap_core::sphere::DiskLattice;
+use rayon::prelude::*;
+
+use super::canvas::{Canvas, LETTER, LINE, display};
+use crate::measure::{Comparison, Subject, three_digits};
+
+/// Pixels of a cell's longer side.
+const CELL: usize = 128;
+
+/// Levels shown, at most.
+const ROWS: usize = 6;
+
+/// Half-vector (or light) of the sheet: a little off the vertical, so that slopes show.
+fn direction() -> DVec3 {
+    DVec3::new(0.22, 0.17, 1.0).normalize()
+}
+
+/// One column of cells: what to write above, and the values of each level shown.
+struct Column {
+    title: String,
+    levels: Vec<Vec<f64>>,
+    errors: Vec<String>,
+}
+
+/// Draws the sheet.
+pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Canvas {
+    // Finest level that fits a cell, and every one below it.
+    let first = comparison.sizes.iter().position(|s| s.width.max(s.height) <= CELL).unwrap_or(0);
+    let shown: Vec<(usize, Size)> =
+        comparison.sizes.iter().copied().enumerate().skip(first).take(ROWS).collect();
+    let columns = columns(subject, comparison, &shown);
+    // One exposure for all: white is what a thousandth of the nearest true texels exceed.
+    let mut bright = columns[0].levels[0].clone();
+    bright.sort_by(f64::total_cmp);
+    let white = bright[bright.len() - 1 - bright.len() / 1000].max(1e-9);
+
+    let label = 11 * LETTER;
+    let finest = comparison.sizes[0];
+    let side = |n: usize| (n * CELL / finest.width.max(finest.height)).max(1);
+    let (width, height) = (side(finest.width), side(finest.height));
+    let (step_x, step_y) = (width.max(16 * LETTER) + 8, height + 2 * LINE);
+    let mut canvas = Canvas::new(label + columns.len() * step_x + 8, 2 * LINE + shown.len() * step_y);
+    for (at, column) in columns.iter().enumerate() {
+        let x = label + at * step_x;
+        canvas.text(x, 8, &column.title);
+        for (row, (_, size)) in shown.iter().enumerate() {
+            let y = 2 * LINE + row * step_y;
+            for j in 0..height {
+                for i in 0..width {
+                    let texel = (j * size.height / height) * size.width + i * size.width / width;
+                    let v = display(column.levels[row][texel] / white);
+                    canvas.set(x + i, y + j, [v; 3]);
+                }
+            }
+            canvas.text(x, y + height + 3, &column.errors[row]);
+        }
+    }
+    for (row, (level, size)) in shown.iter().enumerate() {
+        let y = 2 * LINE + row * step_y;
+        canvas.text(8, y + 8, &format!("level {level}"));
+        canvas.text(8, y + 8 + LINE, &format!("{}x{}", size.width, size.height));
+    }
+    canvas
+}
+
+fn columns(subject: &Subject<'_>, comparison: &Comparison, shown: &[(usize, Size)]) -> Vec<Column> {
+    let w = direction();
+    let lattice = DiskLattice { directions: vec![w], rows: vec![(w.y, 0..1)] };
+    let truth = Truth::new(subject.surface, subject.brdf, &lattice);
+    let texels = |size: Size| (0..size.area()).into_par_iter().map(move |i| (i % size.width, i / size.width));
+    let true_levels = shown
+        .iter()
+        .map(|(_, size)| texels(*size).map(|(x, y)| truth.texel(*size, x, y)[0]).collect())
+        .collect();
+    let mut columns = vec![Column {
+        title: "truth".to_owned(),
+        levels: true_levels,
+        errors: vec![String::new(); shown.len()],
+    }];
+    for row in &comparison.rows {
+        let Ok(method) = ndf::parse(&row.method) else { continue };
+        let evaluator = method.evaluator(subject.brdf, &lattice.directions);
+        let value = |level: usize, x: usize, y: usize| {
+            let mut out = [0.0];
+            evaluator.evaluate(&row.pyramid.texel(level, x, y), &mut out);
+            out[0]
+        };
+        let levels = shown
+            .iter()
+            .map(|(level, size)| texels(*size).map(|(x, y)| value(*level, x, y)).collect())
+            .collect();
+        let errors =
+            shown.iter().map(|(level, _)| format!("error {}", three_digits(row.errors[*level]))).collect();
+        columns.push(Column { title: row.method.clone(), levels, errors });
+    }
+    columns
+}
