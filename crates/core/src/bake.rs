@@ -2,11 +2,14 @@
 //!
 //! Each texel is the exact area-weighted mean of the finest texels under it. A level is averaged from
 //! the coarsest finer level whose texels nest in its own, which for powers of two is the one before, and
-//! from the surface itself where none nests. Level 0 is never held in floats: it is written band by band
-//! while level 1 is summed. Bands are fixed by the map, not by the number of threads, so the bytes are too.
+//! from the surface itself where none nests. A band carries its rows through as many nesting levels as it
+//! can while they are in cache, so the finest levels are never held in floats. Bands are fixed by the map,
+//! not by the number of threads, so the bytes are too.
 
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
+use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use crate::grid::Size;
@@ -35,6 +38,11 @@ pub trait LevelSink {
     /// # Errors
     /// Whatever the sink meets; the bake stops and hands it on.
     fn write_rows(&mut self, place: Place, bytes: &[u8]) -> Result<(), Self::Error>;
+
+    /// All levels, if the sink keeps them in memory; they are then written in place, by all threads.
+    fn memory(&mut self) -> Option<&mut [Vec<u8>]> {
+        None
+    }
 }
 
 /// A bake to be done.
@@ -56,11 +64,14 @@ pub struct BakeReport {
     pub overflowed: usize,
 }
 
-/// Level-1 rows that one task makes: large enough to amortise, small enough to stay in cache.
-const BAND: usize = 16;
+/// Level-1 rows that one task makes: enough to carry through [`CASCADE`] levels.
+const BAND: usize = 8;
 
-/// Tasks whose results may wait for the sink at once.
-const WAVE: usize = 8;
+/// Coarse levels that a band makes, at most: 8 rows become 4, 2 and 1.
+const CASCADE: usize = 4;
+
+/// Tasks a thread may have waiting for the sink at once.
+const WAVE: usize = 4;
 
 impl Bake<'_> {
     /// Size, layers and precision of what will come out.
@@ -87,146 +98,195 @@ impl Bake<'_> {
     /// # Errors
     /// The first error of the sink.
     pub fn run<S: LevelSink>(&self, sink: &mut S) -> Result<BakeReport, S::Error> {
-        let sizes = level_sizes(self.surface.size());
+        let plan = Plan::new(self.layout());
         let mut report = BakeReport::default();
-        let mut sums: Vec<Option<Sums>> = vec![None; sizes.len()];
-        if sizes.len() == 1 {
-            let band = self.fine_band(&(0..1), sizes[0]);
-            report.overflowed += band.overflowed;
-            write_rows(sink, 0, 0, &band.layers)?;
-            return Ok(report);
-        }
-        sums[1] = Some(self.finest_two(&sizes, sink, &mut report)?);
-        for level in 1..sizes.len() {
-            if level > 1 {
-                sums[level] = Some(self.coarser(&sizes, level, &sums));
-            }
-            let Some(made) = &sums[level] else { continue };
-            report.overflowed += self.write_level(sink, level, made)?;
+        let mut sums: Vec<Option<Sums>> = vec![None; plan.sizes.len()];
+        sums[plan.kept] = Some(self.finest(&plan, sink, &mut report)?);
+        for level in plan.kept + 1..plan.sizes.len() {
+            let made = self.coarser(&plan, level, &sums);
+            report.overflowed += self.store(sink, level, &made)?;
+            sums[level] = Some(made);
             for (finer, slot) in sums.iter_mut().enumerate().take(level) {
-                if (level + 1..sizes.len()).all(|later| nearest_nesting(&sizes, later) != finer) {
+                if (level + 1..plan.sizes.len()).all(|later| plan.nearest_nesting(later) != finer) {
                     *slot = None;
                 }
             }
-            (self.progress)(1.0 - 0.1 * (sizes.len() - 1 - level) as f64 / sizes.len() as f64);
+            (self.progress)(1.0 - 0.1 * (plan.sizes.len() - 1 - level) as f64 / plan.sizes.len() as f64);
         }
         Ok(report)
     }
 
-    /// Writes level 0 band by band and returns the sums of level 1.
-    fn finest_two<S: LevelSink>(
+    /// Writes levels 0 to `plan.kept` band by band and returns the sums of the last of them.
+    fn finest<S: LevelSink>(
         &self,
-        sizes: &[Size],
+        plan: &Plan,
         sink: &mut S,
         report: &mut BakeReport,
     ) -> Result<Sums, S::Error> {
-        let (fine, coarse) = (sizes[0], sizes[1]);
-        let mut level1 = Sums::zero(coarse, self.method.layers());
-        let bands: Vec<Range<usize>> =
-            (0..coarse.height).step_by(BAND).map(|r| r..(r + BAND).min(coarse.height)).collect();
-        for wave in bands.chunks(WAVE * rayon::current_num_threads()) {
-            let made: Vec<Band> = wave.par_iter().map(|rows| self.fine_band(rows, coarse)).collect();
-            for (rows, band) in wave.iter().zip(made) {
-                let first = rows.start * fine.height / coarse.height;
-                write_rows(sink, 0, first, &band.layers)?;
-                report.overflowed += band.overflowed;
-                level1.place(rows, &band.level1);
+        let mut kept = Sums::zero(plan.sizes[plan.kept], plan.layout.layers);
+        let bands = plan.bands();
+        let (width, layers) = (kept.size.width, kept.layers);
+        let lengths: Vec<usize> = bands.iter().map(|b| b.rows(plan, plan.kept).len() * width * 4).collect();
+        let kept_bands = split_layers(&mut kept.values, layers, &lengths);
+        let pool = ScratchPool::default();
+        let make = |band: &Band, mut outputs: BandOutputs<'_>| {
+            let mut scratch = pool.take(|| Scratch::new(plan));
+            let overflowed = self.band(plan, band, &mut outputs, &mut scratch);
+            pool.give(scratch);
+            overflowed
+        };
+        if let Some(memory) = sink.memory() {
+            let mut stored: Vec<Vec<Stored<'_>>> = bands.iter().map(|_| Vec::new()).collect();
+            for (level, bytes) in memory.iter_mut().enumerate().take(plan.kept + 1) {
+                let lengths: Vec<usize> = bands.iter().map(|b| b.bytes(plan, level)).collect();
+                let split = split_layers(bytes, layers, &lengths);
+                stored.iter_mut().zip(split).for_each(|(band, part)| band.push(part));
             }
-            let done = wave.last().map_or(0, |rows| rows.end);
-            (self.progress)(0.9 * done as f64 / coarse.height as f64);
+            let outputs =
+                stored.into_iter().zip(kept_bands).map(|(stored, kept)| BandOutputs { stored, kept });
+            let work = bands.par_iter().zip(outputs.collect::<Vec<_>>());
+            report.overflowed += work.map(|(band, outputs)| make(band, outputs)).sum::<usize>();
+            (self.progress)(0.9);
+            return Ok(kept);
         }
-        Ok(level1)
+        let wave = WAVE * rayon::current_num_threads();
+        let mut buffers: Vec<Vec<Vec<Vec<u8>>>> = vec![vec![vec![Vec::new(); layers]; plan.kept + 1]; wave];
+        let mut kept_bands = kept_bands.into_iter();
+        for (done, bands) in bands.chunks(wave).enumerate() {
+            let kept: Vec<_> = kept_bands.by_ref().take(bands.len()).collect();
+            let work = bands.par_iter().zip(&mut buffers).zip(kept);
+            let overflowed = work.map(|((band, buffers), kept)| {
+                let fit = |(level, layers): (usize, &mut Vec<Vec<u8>>)| {
+                    layers.iter_mut().for_each(|bytes| bytes.resize(band.bytes(plan, level), 0));
+                };
+                buffers.iter_mut().enumerate().for_each(fit);
+                let stored =
+                    buffers.iter_mut().map(|l| l.iter_mut().map(Vec::as_mut_slice).collect()).collect();
+                make(band, BandOutputs { stored, kept })
+            });
+            report.overflowed += overflowed.sum::<usize>();
+            for (band, buffers) in bands.iter().zip(&buffers) {
+                for (level, layers) in buffers.iter().enumerate() {
+                    write_rows(sink, level, band.rows(plan, level).start, layers)?;
+                }
+            }
+            (self.progress)(0.9 * ((done + 1) * wave * BAND) as f64 / plan.unit().height as f64);
+        }
+        Ok(kept)
     }
 
-    /// The stored rows of level 0 that belong to level-1 `rows`, and those level-1 sums.
-    fn fine_band(&self, rows: &Range<usize>, coarse: Size) -> Band {
-        let (fine, layers) = (self.surface.size(), self.method.layers());
-        let mut row = SurfaceRow::flat(fine.width);
-        let mut values = vec![0.0; fine.width * 4 * layers];
-        let mut averager = RowAverager::new(fine.width, coarse.width);
-        let mut band = Band {
-            layers: vec![Vec::new(); layers],
-            level1: Sums::zero(Size { height: rows.len(), ..coarse }, layers),
-            overflowed: 0,
-        };
-        let written = rows.start * fine.height / coarse.height..rows.end * fine.height / coarse.height;
-        for bytes in &mut band.layers {
-            bytes.reserve_exact(written.len() * fine.width * self.precision.texel_bytes());
-        }
-        let covered = written.start..(rows.end * fine.height).div_ceil(coarse.height);
-        for y in covered {
-            self.surface.read_row(y, &mut row);
-            self.method.accumulate_row(&row, &mut values);
-            for j in rows.clone() {
+    /// Stores a band's rows of every level it reaches, keeps the sums of the last, and returns how many
+    /// channels overflowed.
+    fn band(&self, plan: &Plan, band: &Band, outputs: &mut BandOutputs<'_>, scratch: &mut Scratch) -> usize {
+        let (fine, coarse) = (plan.sizes[0], plan.unit());
+        let Scratch { row, values, averager, level: current, next } = scratch;
+        let mut overflowed = 0;
+        let written = band.rows(plan, 0);
+        let plane = band.0.len() * coarse.width * 4;
+        current.clear();
+        current.resize(plane * plan.layout.layers, 0.0);
+        // What a band reads may reach one row further than what it writes.
+        for y in written.start..(band.0.end * fine.height).div_ceil(coarse.height) {
+            self.surface.read_row(y, row);
+            self.method.accumulate_row(row, values);
+            for j in band.0.clone() {
                 let (range, weight) = footprint(fine.height, coarse.height, j);
                 if range.contains(&y) {
-                    band.level1.add_row(j - rows.start, &values, weight(y) as f32, &mut averager);
+                    let layers = current.chunks_exact_mut(plane).zip(values.chunks_exact(fine.width * 4));
+                    for (layer, values) in layers {
+                        let out = &mut layer[(j - band.0.start) * coarse.width * 4..][..coarse.width * 4];
+                        averager.add(values, weight(y) as f32, out);
+                    }
                 }
             }
             if written.contains(&y) {
-                self.method.finish_row(&mut values);
-                for (values, bytes) in values.chunks_exact(fine.width * 4).zip(&mut band.layers) {
-                    band.overflowed += self.precision.pack(values, bytes);
+                self.method.finish_row(values);
+                let at = (y - written.start) * plan.row_bytes(0);
+                for (layer, values) in outputs.stored[0].iter_mut().zip(values.chunks_exact(fine.width * 4)) {
+                    overflowed += self.precision.pack_into(values, &mut layer[at..][..plan.row_bytes(0)]);
                 }
             }
         }
-        band
+        for level in 1..=plan.kept {
+            let (rows, width) = (band.rows(plan, level).len(), plan.sizes[level].width);
+            for y in 0..rows {
+                copy_row(current, (rows, width), y, values);
+                self.method.finish_row(&mut values[..width * 4 * plan.layout.layers]);
+                let at = y * plan.row_bytes(level);
+                for (layer, values) in outputs.stored[level].iter_mut().zip(values.chunks_exact(width * 4)) {
+                    overflowed += self.precision.pack_into(values, &mut layer[at..][..plan.row_bytes(level)]);
+                }
+            }
+            if level < plan.kept {
+                halve(current, (rows, width), next);
+                std::mem::swap(current, next);
+            }
+        }
+        for (kept, layer) in
+            outputs.kept.iter_mut().zip(current.chunks_exact(current.len() / plan.layout.layers))
+        {
+            kept.copy_from_slice(layer);
+        }
+        overflowed
     }
 
     /// The sums of `level` from the nearest nesting finer level, or from the surface.
-    fn coarser(&self, sizes: &[Size], level: usize, sums: &[Option<Sums>]) -> Sums {
-        let (size, layers) = (sizes[level], self.method.layers());
-        let from = nearest_nesting(sizes, level);
-        let rows: Vec<Sums> = (0..size.height)
-            .into_par_iter()
-            .map(|j| {
-                let mut out = Sums::zero(Size { height: 1, ..size }, layers);
-                let mut averager = RowAverager::new(sizes[from].width, size.width);
-                let (range, weight) = footprint(sizes[from].height, size.height, j);
-                let mut row = SurfaceRow::flat(if from == 0 { sizes[0].width } else { 0 });
-                let mut values = vec![0.0; sizes[from].width * 4 * layers];
-                for y in range {
-                    match &sums[from] {
-                        Some(finer) => finer.copy_row(y, &mut values),
-                        None => {
-                            self.surface.read_row(y, &mut row);
-                            self.method.accumulate_row(&row, &mut values);
-                        }
+    fn coarser(&self, plan: &Plan, level: usize, sums: &[Option<Sums>]) -> Sums {
+        let (size, layers) = (plan.sizes[level], plan.layout.layers);
+        let from = plan.nearest_nesting(level);
+        let fine = plan.sizes[from];
+        let mut made = Sums::zero(size, layers);
+        let rows = split_layers(&mut made.values, layers, &vec![size.width * 4; size.height]);
+        let averager = RowAverager::new(fine.width, size.width);
+        let scratch = || (SurfaceRow::flat(fine.width), vec![0.0; fine.width * 4 * layers]);
+        rows.into_par_iter().enumerate().for_each_init(scratch, |(row, values), (j, mut out)| {
+            let (range, weight) = footprint(fine.height, size.height, j);
+            for y in range {
+                match &sums[from] {
+                    Some(finer) => copy_row(&finer.values, (fine.height, fine.width), y, values),
+                    None => {
+                        self.surface.read_row(y, row);
+                        self.method.accumulate_row(row, values);
                     }
-                    out.add_row(0, &values, weight(y) as f32, &mut averager);
                 }
-                out
-            })
-            .collect();
-        let mut whole = Sums::zero(size, layers);
-        for (j, row) in rows.iter().enumerate() {
-            whole.place(&(j..j + 1), row);
-        }
-        whole
+                for (out, values) in out.iter_mut().zip(values.chunks_exact(fine.width * 4)) {
+                    averager.add(values, weight(y) as f32, out);
+                }
+            }
+        });
+        made
     }
 
     /// Stores a level; returns how many channels overflowed.
-    fn write_level<S: LevelSink>(&self, sink: &mut S, level: usize, sums: &Sums) -> Result<usize, S::Error> {
-        let row_length = sums.size.width * 4;
-        let rows: Vec<(Vec<Vec<u8>>, usize)> = (0..sums.size.height)
+    fn store<S: LevelSink>(&self, sink: &mut S, level: usize, sums: &Sums) -> Result<usize, S::Error> {
+        let (row_length, row_bytes) = (sums.size.width * 4, sums.size.width * self.precision.texel_bytes());
+        let mut own = Vec::new();
+        let memory = sink.memory();
+        let in_place = memory.is_some();
+        let bytes = match memory {
+            Some(levels) => &mut levels[level],
+            None => {
+                own.resize(row_bytes * sums.size.height * sums.layers, 0);
+                &mut own
+            }
+        };
+        let rows = split_layers(bytes, sums.layers, &vec![row_bytes; sums.size.height]);
+        let values = || vec![0.0; row_length * sums.layers];
+        let overflowed = rows
             .into_par_iter()
-            .map(|y| {
-                let mut values = vec![0.0; row_length * sums.layers];
-                sums.copy_row(y, &mut values);
-                self.method.finish_row(&mut values);
-                let mut overflowed = 0;
-                let pack = |part: &[f32]| {
-                    let mut bytes = Vec::new();
-                    overflowed += self.precision.pack(part, &mut bytes);
-                    bytes
-                };
-                (values.chunks_exact(row_length).map(pack).collect(), overflowed)
+            .enumerate()
+            .map_init(values, |values, (y, stored)| {
+                copy_row(&sums.values, (sums.size.height, sums.size.width), y, values);
+                self.method.finish_row(values);
+                let layers = stored.into_iter().zip(values.chunks_exact(row_length));
+                layers.map(|(stored, values)| self.precision.pack_into(values, stored)).sum::<usize>()
             })
-            .collect();
-        for (y, (layers, _)) in rows.iter().enumerate() {
-            write_rows(sink, level, y, layers)?;
+            .sum();
+        if !in_place {
+            let layers: Vec<&[u8]> = own.chunks_exact(row_bytes * sums.size.height).collect();
+            write_rows(sink, level, 0, &layers)?;
         }
-        Ok(rows.iter().map(|(_, overflowed)| overflowed).sum())
+        Ok(overflowed)
     }
 }
 
@@ -235,28 +295,133 @@ fn write_rows<S: LevelSink>(
     sink: &mut S,
     level: usize,
     row: usize,
-    layers: &[Vec<u8>],
+    layers: &[impl AsRef<[u8]>],
 ) -> Result<(), S::Error> {
     layers
         .iter()
         .enumerate()
-        .try_for_each(|(layer, bytes)| sink.write_rows(Place { level, layer, row }, bytes))
+        .try_for_each(|(layer, bytes)| sink.write_rows(Place { level, layer, row }, bytes.as_ref()))
 }
 
-/// The coarsest level finer than `level` (and coarser than 0) whose texels nest in it; else 0, the surface.
-fn nearest_nesting(sizes: &[Size], level: usize) -> usize {
-    let nests = |k: &usize| {
-        sizes[*k].width.is_multiple_of(sizes[level].width)
-            && sizes[*k].height.is_multiple_of(sizes[level].height)
-    };
-    (1..level).rev().find(nests).unwrap_or(0)
+/// Splits layers that lie one after another into bands of these lengths: for each band, its part of every layer.
+fn split_layers<'a, T>(data: &'a mut [T], layers: usize, lengths: &[usize]) -> Vec<Vec<&'a mut [T]>> {
+    let mut bands: Vec<Vec<&mut [T]>> = lengths.iter().map(|_| Vec::with_capacity(layers)).collect();
+    let mut rest = data;
+    for _ in 0..layers {
+        for (band, length) in bands.iter_mut().zip(lengths) {
+            let (part, after) = rest.split_at_mut(*length);
+            band.push(part);
+            rest = after;
+        }
+    }
+    bands
 }
 
-/// Rows of level 0 ready to be written, with the level-1 sums above them.
-struct Band {
-    layers: Vec<Vec<u8>>,
-    level1: Sums,
-    overflowed: usize,
+/// Sizes of all levels, and which of them bands reach.
+struct Plan {
+    layout: Layout,
+    sizes: Vec<Size>,
+    /// Last level that bands make; its sums are kept for the levels beyond.
+    kept: usize,
+}
+
+impl Plan {
+    fn new(layout: Layout) -> Self {
+        let sizes = level_sizes(layout.size);
+        let halves =
+            |l: &usize| sizes[l - 1] == Size { width: 2 * sizes[*l].width, height: 2 * sizes[*l].height };
+        let last = CASCADE.min(sizes.len() - 1);
+        let kept = (2..=last).take_while(halves).last().unwrap_or(1.min(last));
+        Self { layout, sizes, kept }
+    }
+
+    /// The level whose rows bands are counted in: 1, or 0 when there is no other.
+    fn unit(&self) -> Size {
+        self.sizes[1.min(self.kept)]
+    }
+
+    fn bands(&self) -> Vec<Band> {
+        let height = self.unit().height;
+        (0..height).step_by(BAND).map(|r| Band(r..(r + BAND).min(height))).collect()
+    }
+
+    fn row_bytes(&self, level: usize) -> usize {
+        self.sizes[level].width * self.layout.precision.texel_bytes()
+    }
+
+    /// The coarsest kept level finer than `level` whose texels nest in it; else 0, the surface.
+    fn nearest_nesting(&self, level: usize) -> usize {
+        let coarse = self.sizes[level];
+        let nests = |k: &usize| {
+            let fine = self.sizes[*k];
+            fine.width.is_multiple_of(coarse.width) && fine.height.is_multiple_of(coarse.height)
+        };
+        (self.kept..level).rev().find(nests).unwrap_or(0)
+    }
+}
+
+/// The rows of the unit level that one task makes.
+struct Band(Range<usize>);
+
+impl Band {
+    /// Rows of a level that this band stores: on level 0 those that begin in it.
+    fn rows(&self, plan: &Plan, level: usize) -> Range<usize> {
+        let (own, unit) = (plan.sizes[level].height, plan.unit().height);
+        self.0.start * own / unit..self.0.end * own / unit
+    }
+
+    fn bytes(&self, plan: &Plan, level: usize) -> usize {
+        self.rows(plan, level).len() * plan.row_bytes(level)
+    }
+}
+
+/// The stored rows of one level, layer by layer.
+type Stored<'a> = Vec<&'a mut [u8]>;
+
+/// Where a band puts what it makes.
+struct BandOutputs<'a> {
+    /// One a level, from 0 to the kept one.
+    stored: Vec<Stored<'a>>,
+    /// Sums of the kept level, layer by layer.
+    kept: Vec<&'a mut [f32]>,
+}
+
+/// What a task needs to itself.
+struct Scratch {
+    row: SurfaceRow,
+    values: Vec<f32>,
+    averager: RowAverager,
+    /// Sums of the band's rows on the level at hand, and on the next.
+    level: Vec<f32>,
+    next: Vec<f32>,
+}
+
+impl Scratch {
+    fn new(plan: &Plan) -> Self {
+        let fine = plan.sizes[0].width;
+        Self {
+            row: SurfaceRow::flat(fine),
+            values: vec![0.0; fine * 4 * plan.layout.layers],
+            averager: RowAverager::new(fine, plan.unit().width),
+            level: Vec::new(),
+            next: Vec::new(),
+        }
+    }
+}
+
+/// Scratch memory that tasks hand on: megabytes that need not be asked of the system for every band.
+#[derive(Default)]
+struct ScratchPool(Mutex<Vec<Scratch>>);
+
+impl ScratchPool {
+    fn take(&self, new: impl FnOnce() -> Scratch) -> Scratch {
+        let waiting = self.0.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        waiting.unwrap_or_else(new)
+    }
+
+    fn give(&self, scratch: Scratch) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
+    }
 }
 
 /// One level in single floats: layers one after another, each rows of RGBA texels.
@@ -271,45 +436,31 @@ impl Sums {
     fn zero(size: Size, layers: usize) -> Self {
         Self { size, layers, values: vec![0.0; size.area() * 4 * layers] }
     }
+}
 
-    fn row_mut(&mut self, layer: usize, y: usize) -> &mut [f32] {
-        let length = self.size.width * 4;
-        &mut self.values[(layer * self.size.height + y) * length..][..length]
+/// Gathers row `y` of every layer of `rows` × `width` RGBA texels, layer after layer.
+fn copy_row(sums: &[f32], (rows, width): (usize, usize), y: usize, out: &mut [f32]) {
+    let length = width * 4;
+    for (layer, out) in sums.chunks_exact(rows * length).zip(out.chunks_exact_mut(length)) {
+        out.copy_from_slice(&layer[y * length..][..length]);
     }
+}
 
-    fn row(&self, layer: usize, y: usize) -> &[f32] {
-        let length = self.size.width * 4;
-        &self.values[(layer * self.size.height + y) * length..][..length]
-    }
-
-    /// Copies a band of whole rows into its place.
-    fn place(&mut self, rows: &Range<usize>, band: &Self) {
-        for layer in 0..self.layers {
-            for y in rows.clone() {
-                self.row_mut(layer, y).copy_from_slice(band.row(layer, y - rows.start));
-            }
-        }
-    }
-
-    /// Gathers row `y` of every layer, layer after layer.
-    fn copy_row(&self, y: usize, out: &mut [f32]) {
-        for (layer, out) in out.chunks_exact_mut(self.size.width * 4).enumerate() {
-            out.copy_from_slice(self.row(layer, y));
-        }
-    }
-
-    /// Adds `weight` times a finer row (all layers) to row `y`.
-    fn add_row(&mut self, y: usize, finer: &[f32], weight: f32, averager: &mut RowAverager) {
-        for (layer, finer) in finer.chunks_exact(averager.fine * 4).enumerate() {
-            averager.add(finer, weight, self.row_mut(layer, y));
+/// Averages two by two, in every layer of `rows` × `width` RGBA texels.
+fn halve(sums: &[f32], (rows, width): (usize, usize), out: &mut Vec<f32>) {
+    out.clear();
+    out.resize(sums.len() / 4, 0.0);
+    let averager = RowAverager::new(width, width / 2);
+    for (two, out) in sums.chunks_exact(rows * width * 4).zip(out.chunks_exact_mut(rows * width)) {
+        for (two, out) in two.chunks_exact(width * 8).zip(out.chunks_exact_mut(width * 2)) {
+            averager.add(&two[..width * 4], 0.5, out);
+            averager.add(&two[width * 4..], 0.5, out);
         }
     }
 }
 
 /// Averages rows of RGBA texels from `fine` to `coarse` texels.
 struct RowAverager {
-    fine: usize,
-    coarse: usize,
     /// For each coarse texel its first fine one and the weights from there on; empty when pairs nest.
     taps: Vec<(usize, Vec<f32>)>,
 }
@@ -321,28 +472,33 @@ impl RowAverager {
             (range.start, range.map(|j| weight(j) as f32).collect())
         };
         let taps = if fine == 2 * coarse { Vec::new() } else { (0..coarse).map(tap).collect() };
-        Self { fine, coarse, taps }
+        Self { taps }
     }
 
+    /// Adds `weight` times the averaged row to `out`.
     fn add(&self, finer: &[f32], weight: f32, out: &mut [f32]) {
-        debug_assert_eq!(out.len(), self.coarse * 4);
         let out = out.as_chunks_mut::<4>().0;
         if self.taps.is_empty() {
-            let half = 0.5 * weight;
-            for (o, pair) in out.iter_mut().zip(finer.as_chunks::<8>().0) {
+            // The same additions in the same order at every SIMD level, so the same bits.
+            dispatch!(Level::new(), _simd => add_pairs(finer, 0.5 * weight, out));
+            return;
+        }
+        let finer = finer.as_chunks::<4>().0;
+        for (o, (first, weights)) in out.iter_mut().zip(&self.taps) {
+            for (texel, w) in finer[*first..].iter().zip(weights) {
                 for c in 0..4 {
-                    o[c] += half * (pair[c] + pair[c + 4]);
+                    o[c] += weight * w * texel[c];
                 }
             }
-        } else {
-            let finer = finer.as_chunks::<4>().0;
-            for (o, (first, weights)) in out.iter_mut().zip(&self.taps) {
-                for (texel, w) in finer[*first..].iter().zip(weights) {
-                    for c in 0..4 {
-                        o[c] += weight * w * texel[c];
-                    }
-                }
-            }
+        }
+    }
+}
+
+#[inline(always)]
+fn add_pairs(finer: &[f32], weight: f32, out: &mut [[f32; 4]]) {
+    for (o, pair) in out.iter_mut().zip(finer.as_chunks::<8>().0) {
+        for c in 0..4 {
+            o[c] += weight * (pair[c] + pair[c + 4]);
         }
     }
 }
@@ -381,5 +537,9 @@ impl LevelSink for MemorySink {
             (place.layer * size.height + place.row) * size.width * self.layout.precision.texel_bytes();
         self.levels[place.level][start..start + bytes.len()].copy_from_slice(bytes);
         Ok(())
+    }
+
+    fn memory(&mut self) -> Option<&mut [Vec<u8>]> {
+        Some(&mut self.levels)
     }
 }

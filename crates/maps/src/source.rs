@@ -2,10 +2,13 @@
 
 use std::path::Path;
 
+use fearless_simd::{Level, dispatch};
 use glam::Vec3;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::procedural;
-use ndfmap_core::surface::{HeightField, SlopeFilter, Surface, SurfaceRow, Wraps, integrability, unit_or_up};
+use ndfmap_core::surface::{
+    HeightField, MAX_SLOPE, SlopeFilter, Surface, SurfaceRow, Wraps, integrability, unit_or_up,
+};
 use sha2::{Digest, Sha256};
 
 use crate::formats::{read_file, read_image};
@@ -82,6 +85,9 @@ pub struct SourceMap {
 
 /// What built-in surfaces are called: this and a name.
 pub const BUILTIN_PREFIX: &str = "builtin:";
+
+/// Heights that span more texture widths than this are surely in other units.
+const STEEP_SPAN: f32 = 2.0;
 
 /// Below this signed [`integrability`] a map contradicts its convention; at what real maps reach when
 /// nothing can be said (0.22, linen) it must stay silent.
@@ -191,6 +197,13 @@ fn height_field(
     if bad == image.size.area() {
         return Err(MapError::invalid(path, "holds no finite height"));
     }
+    let (low, high) = heights.texels().iter().fold((f32::MAX, f32::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
+    if high - low > STEEP_SPAN {
+        let span = high - low;
+        warnings.push(format!(
+            "spans {span} texture widths of height: `--height-scale` is texture widths for one unit of height"
+        ));
+    }
     if bad > 0 {
         warnings.push(format!("{bad} texels are NaN or infinite and take height 0"));
     }
@@ -249,28 +262,34 @@ impl EncodedNormals {
 
     /// Counts what is no normal, and asks whether the convention can be right.
     fn look_over(&self, convention: Convention, warnings: &mut Vec<String>) {
-        let texels = self.image.size.area();
         let mut row = SurfaceRow::flat(self.image.size.width);
-        let (mut black, mut broken, mut below) = (0, 0, 0);
-        for y in 0..self.image.size.height {
-            self.read_row(y, &mut row);
-            below += row.z.iter().filter(|z| **z <= 0.0).count();
-            for i in 0..self.image.size.width {
-                let stored = self.stored(y, i);
-                black += usize::from(stored == Vec3::ZERO);
-                broken += usize::from(!stored.is_finite());
-            }
-        }
-        let percent = |n: usize| 100.0 * n as f64 / texels as f64;
-        let mut say = |n: usize, what: &str| {
-            if n > 0 {
-                warnings.push(format!("{n} texels ({:.2} %) {what}", percent(n)));
-            }
+        let below: usize = (0..self.image.size.height)
+            .map(|y| {
+                self.read_row(y, &mut row);
+                row.z.iter().filter(|z| **z <= 0.0).count()
+            })
+            .sum();
+        let count = |is: fn(f32) -> bool, need_all: bool| {
+            let at = |i: usize, c: usize| is(self.image.samples.get(i * self.image.channels + c));
+            let texel = |i: &usize| match need_all {
+                true => at(*i, 0) && at(*i, 1) && at(*i, 2),
+                false => (0..self.image.channels).any(|c| at(*i, c)),
+            };
+            (0..self.image.size.area()).filter(texel).count()
         };
         // Black in two channels is a legal, if steep, normal.
-        say(if self.two_channels { 0 } else { black }, "are black, no direction, and become (0, 0, 1)");
+        let black = if self.two_channels { 0 } else { count(|v| v == 0.0, true) };
+        let broken =
+            if matches!(self.image.samples, Samples::F32(_)) { count(|v| !v.is_finite(), false) } else { 0 };
+        let texels = self.image.size.area() as f64;
+        let mut say = |n: usize, what: &str| {
+            if n > 0 {
+                warnings.push(format!("{n} texels ({:.2} %) {what}", 100.0 * n as f64 / texels));
+            }
+        };
+        say(black, "are black, no direction, and become (0, 0, 1)");
         say(broken, "are NaN or infinite and become (0, 0, 1)");
-        say(below, "point to or below the horizon; their slopes are held to 255");
+        say(below, &format!("point to or below the horizon; their slopes are held to {MAX_SLOPE}"));
         let agreement = integrability(self);
         if agreement < CONTRADICTION {
             let other = match convention {
@@ -286,28 +305,38 @@ impl EncodedNormals {
         }
     }
 
-    /// The three samples of a texel as they are in the file.
-    #[inline]
-    fn stored(&self, y: usize, x: usize) -> Vec3 {
-        let at = (y * self.image.size.width + x) * self.image.channels;
-        let blue = if self.image.channels > 2 { self.image.samples.get(at + 2) } else { 0.0 };
-        Vec3::new(self.image.samples.get(at), self.image.samples.get(at + 1), blue)
-    }
-
-    /// The unit normal of a stored vector.
-    #[inline]
-    fn decode(&self, stored: Vec3) -> Vec3 {
-        if stored == Vec3::ZERO && !self.two_channels {
-            return Vec3::Z;
+    /// Spreads a row of samples over the planes, each decoded to -1 .. 1.
+    fn spread<T: Copy>(&self, samples: &[T], y: usize, row: &mut SurfaceRow, decode: impl Fn(T) -> f32) {
+        let length = self.image.size.width * self.image.channels;
+        let texels = samples[y * length..][..length].chunks_exact(self.image.channels);
+        let planes = row.x.iter_mut().zip(&mut row.y).zip(&mut row.z);
+        for (texel, ((x, y), z)) in texels.zip(planes) {
+            (*x, *y) = (decode(texel[0]), decode(texel[1]));
+            *z = if texel.len() > 2 { decode(texel[2]) } else { 0.0 };
         }
-        let mut v = if self.positive { stored * 2.0 - 1.0 } else { stored };
-        if self.two_channels {
-            v.z = (1.0 - v.x * v.x - v.y * v.y).max(0.0).sqrt();
-        }
-        v.y *= self.green;
-        unit_or_up(v)
     }
 }
+
+impl EncodedNormals {
+    /// Makes unit normals of decoded samples.
+    #[inline(always)]
+    fn normalise(&self, row: &mut SurfaceRow) {
+        for ((x, y), z) in row.x.iter_mut().zip(&mut row.y).zip(&mut row.z) {
+            if self.two_channels {
+                *z = (1.0 - *x * *x - *y * *y).max(0.0).sqrt();
+            }
+            // Black, stored as three zeros, is no direction: unsigned it decodes to the corner below.
+            let black = self.positive && !self.two_channels && *x + *y + *z == -3.0;
+            let v = if black { Vec3::ZERO } else { Vec3::new(*x, *y * self.green, *z) };
+            let n = unit_or_up(v);
+            (*x, *y, *z) = (n.x, n.y, n.z);
+        }
+    }
+}
+
+/// What a stored 8-bit channel means.
+static DECODE_U8: std::sync::LazyLock<[f32; 256]> =
+    std::sync::LazyLock::new(|| std::array::from_fn(|c| 2.0 * (c as f32 / 255.0) - 1.0));
 
 impl Surface for EncodedNormals {
     fn size(&self) -> Size {
@@ -320,8 +349,15 @@ impl Surface for EncodedNormals {
 
     fn read_row(&self, y: usize, row: &mut SurfaceRow) {
         row.height.fill(0.0);
-        for x in 0..self.image.size.width {
-            row.set_normal(x, self.decode(self.stored(y, x)));
+        match &self.image.samples {
+            Samples::U8(v) => {
+                let table = &*DECODE_U8;
+                self.spread(v, y, row, |c| table[usize::from(c)]);
+            }
+            Samples::U16(v) => self.spread(v, y, row, |c| 2.0 * (f32::from(c) / 65535.0) - 1.0),
+            Samples::F32(v) if self.positive => self.spread(v, y, row, |c| 2.0 * c - 1.0),
+            Samples::F32(v) => self.spread(v, y, row, |c| c),
         }
+        dispatch!(Level::new(), _simd => self.normalise(row));
     }
 }

@@ -5,6 +5,10 @@ use std::process::ExitCode;
 use clap::Parser;
 use ndfmap::commands::Program;
 
+/// Bands of a bake come and go by the megabyte; the system's allocator gives each back and faults it in again.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 fn main() -> ExitCode {
     ndfmap::clean_up_when_interrupted();
     match Program::parse().run() {

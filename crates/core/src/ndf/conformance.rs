@@ -48,6 +48,32 @@ fn bad_spellings_say_why() {
     assert!(message("ndm:brdf:integrated").contains("before the BRDF is known"));
 }
 
+#[test]
+fn rows_equal_texels_one_by_one() {
+    // Whole rows may take a faster way; its bits must be those of the plain one.
+    fn plain<R: super::Representation>(representation: &R, row: &SurfaceRow) -> Vec<f32> {
+        let width = row.width();
+        let mut channels = vec![0.0; representation.layers() * 4 * width];
+        for i in 0..width {
+            let mut sums = representation.zero();
+            let sample = super::Sample { normal: row.normal(i), height: row.height[i] };
+            representation.accumulate(&mut sums, &sample, 1.0);
+            let mut texel = vec![0.0; representation.layers() * 4];
+            representation.pack(&sums, &mut texel);
+            for (c, value) in texel.iter().enumerate() {
+                channels[((c / 4) * width + i) * 4 + c % 4] = *value;
+            }
+        }
+        channels
+    }
+    let surface = (procedural::find("foil").unwrap().build)(Size::new(37, 5).unwrap());
+    let mut row = SurfaceRow::flat(37);
+    surface.read_row(2, &mut row);
+    let mut fast = vec![0.0; 37 * 8];
+    Method::accumulate_row(&super::Slopes, &row, &mut fast);
+    assert_eq!(fast, plain(&super::Slopes, &row));
+}
+
 /// The lobe cut at an order, its ringing clamped as the method clamps it.
 fn band_limited(brdf: &dyn Brdf, order: usize, u: f64) -> f64 {
     let rho = brdf.zonal(order);

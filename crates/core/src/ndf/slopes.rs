@@ -9,11 +9,12 @@
 //! `D = P22 / w.z⁴` counts facet area and is brighter by 1/w.z where the map is steep (`docs/methods.md`
 //! has what that costs). Lambert is averaged over 5×5 slopes of the Gaussian, as in LEADR.
 
-use glam::{DVec2, DVec3};
+use fearless_simd::{Level, dispatch};
+use glam::{DVec2, DVec3, Vec3};
 
 use super::{Decoded, Representation, Row, Sample, no_parameters};
 use crate::brdf::Brdf;
-use crate::surface::slope_of_normal;
+use crate::surface::{SurfaceRow, slope_of_normal};
 use crate::units::SlopeVariance;
 
 /// Moments of the slope.
@@ -109,6 +110,16 @@ fn slope_samples(g: &SlopeGaussian) -> Vec<(DVec3, f64)> {
     samples
 }
 
+#[inline(always)]
+fn moments_of_row(row: &SurfaceRow, first: &mut [[f32; 4]], second: &mut [[f32; 4]]) {
+    let normals = row.x.iter().zip(&row.y).zip(&row.z).zip(&row.height);
+    for ((((x, y), z), height), (first, second)) in normals.zip(first.iter_mut().zip(second)) {
+        let s = slope_of_normal(Vec3::new(*x, *y, *z));
+        *first = [*height, s.x, s.y, 1.0];
+        *second = [s.x * s.x, s.y * s.y, s.x * s.y, 1.0];
+    }
+}
+
 impl Representation for Slopes {
     type Sums = SlopeMoments;
     type Lobes = SlopeGaussian;
@@ -148,6 +159,12 @@ impl Representation for Slopes {
     fn pack(&self, sums: &SlopeMoments, channels: &mut [f32]) {
         let ([x, y], [xx, yy, xy]) = (sums.mean, sums.second);
         channels.copy_from_slice(&[sums.height, x, y, 1.0, xx, yy, xy, 1.0]);
+    }
+
+    fn pack_row(&self, row: &SurfaceRow, channels: &mut [f32]) {
+        let (first, second) = channels.split_at_mut(4 * row.width());
+        let (first, second) = (first.as_chunks_mut().0, second.as_chunks_mut().0);
+        dispatch!(Level::new(), _simd => moments_of_row(row, first, second));
     }
 
     fn unpack(&self, channels: &[f32]) -> SlopeMoments {

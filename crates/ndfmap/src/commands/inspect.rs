@@ -141,5 +141,6 @@ fn as_lines(value: &Value) -> String {
         }
         other => format!("{key:name$}  {other}"),
     };
-    all.iter().map(line).collect::<Vec<_>>().join("\n")
+    // Warnings have been said already, on stderr.
+    all.iter().filter(|(key, _)| *key != "warnings").map(line).collect::<Vec<_>>().join("\n")
 }
