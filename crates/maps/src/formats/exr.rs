@@ -137,10 +137,9 @@ fn read_ndf(path: &Path, bytes: &[u8]) -> Result<Option<NdfMap>, MapError> {
         .map_err(invalid)?;
     let layers: Vec<AnyLayer> = image.layer_data.into_iter().collect();
     if bumpslopes {
-        let wraps = match first.own_attributes.other.get(&Text::from("wrapmodes")) {
-            Some(AttributeValue::Text(text)) => spell_oiio_wraps(&text.to_string()),
-            _ => ["clamp".to_owned(), "clamp".to_owned()],
-        };
+        let wraps = spell_oiio_wraps(
+            &first.own_attributes.wrap_mode_name.as_ref().map(Text::to_string).unwrap_or_default(),
+        );
         return read_bumpslopes(path, header, &layers[0], wraps).map(Some);
     }
     let Some(header) = header else { return Ok(None) };
@@ -396,7 +395,7 @@ fn write_layers(
                 LayerAttributes::named(name.as_str())
             };
             // So that OpenImageIO's texture system takes the file for a texture and wraps it as it was baked.
-            own.other.insert(Text::from("wrapmodes"), text(&wraps));
+            own.wrap_mode_name = Some(Text::from(wraps.as_str()));
             own.other.insert(Text::from("textureformat"), text("Plain Texture"));
             Layer::new(size, own, encoding, channels)
         })

@@ -1,0 +1,178 @@
+//! Every format reads what it should, and what is written comes back.
+
+mod common;
+
+use std::path::Path;
+
+use common::{HEIGHT, WIDTH, baked, pictures, png, rgb8};
+use ndfmap_core::bake::{LevelSink, Place};
+use ndfmap_core::grid::Size;
+use ndfmap_core::pyramid::{Layout, Precision};
+use ndfmap_core::surface::{Surface, SurfaceRow};
+use ndfmap_maps::formats::exr::{write_bumpslopes, write_native};
+use ndfmap_maps::formats::ktx2::Ktx2Sink;
+use ndfmap_maps::formats::{read_file, read_image, read_ndf};
+use ndfmap_maps::source::{SourceMap, SourceOptions, read_source, source_of_image};
+use ndfmap_maps::{NdfMap, SourceKind};
+
+fn source(name: &str, bytes: &[u8], options: &SourceOptions) -> SourceMap {
+    let path = Path::new(name);
+    source_of_image(path, read_image(path, bytes).unwrap(), String::new(), options).unwrap()
+}
+
+fn normals(surface: &dyn Surface) -> Vec<glam::Vec3> {
+    let mut row = SurfaceRow::flat(surface.size().width);
+    (0..surface.size().height)
+        .flat_map(|y| {
+            surface.read_row(y, &mut row);
+            (0..row.width()).map(|i| row.normal(i)).collect::<Vec<_>>()
+        })
+        .collect()
+}
+
+#[test]
+fn every_picture_format_gives_the_same_normals() {
+    let expected: Vec<glam::Vec3> = rgb8()
+        .chunks(3)
+        .map(|c| glam::Vec3::from_slice(&[0, 1, 2].map(|i| f32::from(c[i]) / 127.5 - 1.0)).normalize())
+        .collect();
+    for (name, bytes) in pictures() {
+        let map = source(name, &bytes, &SourceOptions::default());
+        assert_eq!(map.source.kind, SourceKind::Normal, "{name}");
+        assert_eq!(map.surface.size(), Size { width: WIDTH, height: HEIGHT });
+        // JPEG loses; RGBE cuts to 8 bits under a shared exponent, 2/256 a channel; all else is exact.
+        let tolerance = match name {
+            "map.jpg" => 0.25,
+            "map.hdr" => 0.015,
+            _ => 1e-6,
+        };
+        for (got, expected) in normals(&*map.surface).iter().zip(&expected) {
+            assert!((*got - *expected).length() < tolerance, "{name}: {got} {expected}");
+        }
+    }
+}
+
+#[test]
+fn directx_turns_green_and_two_channels_get_their_z_back() {
+    let bytes = png(png::ColorType::Rgb, png::BitDepth::Eight, &rgb8());
+    let up = normals(&*source("a.png", &bytes, &SourceOptions::default()).surface);
+    let options =
+        SourceOptions { convention: ndfmap_maps::source::Convention::DirectX, ..Default::default() };
+    let down = normals(&*source("a.png", &bytes, &options).surface);
+    assert!(up.iter().zip(&down).all(|(u, d)| u.x == d.x && u.y == -d.y && u.z == d.z));
+    let no_blue: Vec<u8> = rgb8().chunks(3).flat_map(|c| [c[0], c[1], 0]).collect();
+    let bytes = png(png::ColorType::Rgb, png::BitDepth::Eight, &no_blue);
+    let map = source("a.png", &bytes, &SourceOptions::default());
+    assert!(map.warnings[0].contains("no blue"), "{:?}", map.warnings);
+    for (a, b) in normals(&*map.surface).iter().zip(&up) {
+        // Both were rounded to 8 bits, z apart from x and y.
+        assert!((*a - *b).length() < 0.02);
+    }
+}
+
+#[test]
+fn black_texels_point_up_and_are_counted() {
+    let mut data = rgb8();
+    data[..9].fill(0);
+    let bytes = png(png::ColorType::Rgb, png::BitDepth::Eight, &data);
+    let map = source("a.png", &bytes, &SourceOptions::default());
+    assert!(map.warnings[0].starts_with("3 texels (3.57 %) are black"), "{:?}", map.warnings);
+    assert_eq!(normals(&*map.surface)[..3], [glam::Vec3::Z; 3]);
+}
+
+#[test]
+fn grey_is_height_nan_is_counted_and_depth_inverts() {
+    use tiff::encoder::colortype::Gray32Float;
+    let mut heights: Vec<f32> = (0..WIDTH * HEIGHT).map(|i| i as f32).collect();
+    heights[5] = f32::NAN;
+    heights[6] = f32::INFINITY;
+    let bytes = common::tiff::<Gray32Float>(&heights);
+    let options = SourceOptions { height_scale: 0.01, invert: true, ..Default::default() };
+    let map = source("h.tif", &bytes, &options);
+    assert_eq!(map.source.kind, SourceKind::Height);
+    assert!(map.warnings[0].starts_with("2 texels are NaN or infinite"), "{:?}", map.warnings);
+    let mut row = SurfaceRow::flat(WIDTH);
+    map.surface.read_row(0, &mut row);
+    assert_eq!(row.height[3], -0.03);
+    assert!(row.z.iter().all(|z| z.is_finite() && *z > 0.0));
+    let all_bad = common::tiff::<Gray32Float>(&vec![f32::NAN; WIDTH * HEIGHT]);
+    let image = read_image("h.tif".as_ref(), &all_bad).unwrap();
+    let error = source_of_image("h.tif".as_ref(), image, String::new(), &options).err().unwrap();
+    assert_eq!(error.to_string(), "h.tif: holds no finite height");
+}
+
+#[test]
+fn missing_files_folders_and_strangers_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let error = |path: &Path| read_source(path, &SourceOptions::default()).err().unwrap().to_string();
+    assert!(error(folder.path()).ends_with("is a folder, not a file"));
+    assert!(error(&folder.path().join("none.png")).contains("none.png"));
+    assert!(error("builtin:armor".as_ref()).contains("there are carved-disk, armour"));
+    let text = folder.path().join("a.png");
+    std::fs::write(&text, "hello").unwrap();
+    assert!(error(&text).ends_with("does not begin like a PNG file"));
+    std::fs::write(&text, "").unwrap();
+    assert!(error(&text).ends_with("is empty"));
+    let other = folder.path().join("a.gif");
+    std::fs::write(&other, "GIF89a").unwrap();
+    assert!(error(&other).contains("is of no known format; known are PNG, JPEG"));
+}
+
+fn write_ktx2(path: &Path, map: &NdfMap) {
+    let p = &map.pyramid;
+    let layout =
+        Layout { size: p.sizes()[0], layers: p.layers(), precision: p.precision(), wraps: p.wraps() };
+    let mut sink = Ktx2Sink::create(path, &map.header, layout).unwrap();
+    for level in 0..p.sizes().len() {
+        let layers = p.level_bytes(level).chunks_exact(p.level_bytes(level).len() / p.layers());
+        for (layer, bytes) in layers.enumerate() {
+            sink.write_rows(Place { level, layer, row: 0 }, bytes).unwrap();
+        }
+    }
+    let length = sink.finish().unwrap();
+    assert_eq!(length, std::fs::metadata(path).unwrap().len());
+}
+
+#[test]
+fn baked_maps_come_back_bit_for_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    for method in ndfmap_core::ndf::TABLE.iter().map(|row| row.samples[0]) {
+        for precision in [Precision::Half, Precision::Single] {
+            let map = baked(method, "foil", precision);
+            for name in ["map.ktx2", "map.exr"] {
+                let path = folder.path().join(name);
+                if name.ends_with("ktx2") {
+                    write_ktx2(&path, &map)
+                } else {
+                    assert!(write_native(&path, &map).unwrap() > 0)
+                }
+                let back = read_ndf(&path, &read_file(&path).unwrap()).unwrap().unwrap();
+                assert!(back == map, "{method} {precision:?} {name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn bumpslopes_come_back_for_heights_and_normals() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("b.exr");
+    for builtin in ["armour", "v-groove"] {
+        let map = baked("slopes", builtin, Precision::Single);
+        write_bumpslopes(&path, &map).unwrap();
+        let back = read_ndf(&path, &read_file(&path).unwrap()).unwrap().unwrap();
+        assert_eq!(back.header, map.header);
+        for (level, size) in map.pyramid.sizes().iter().enumerate() {
+            for i in 0..size.area() {
+                let (x, y) = (i % size.width, i / size.width);
+                for (a, b) in back.pyramid.texel(level, x, y).iter().zip(map.pyramid.texel(level, x, y)) {
+                    // Scaled to OpenImageIO's units and back in single precision.
+                    assert!((a - b).abs() <= 4e-7 * b.abs(), "{builtin} level {level}: {a} {b}");
+                }
+            }
+        }
+    }
+    let naive = baked("naive", "armour", Precision::Half);
+    let error = write_bumpslopes(&path, &naive).unwrap_err().to_string();
+    assert!(error.ends_with("holds the method `slopes`, not `naive`"));
+}
