@@ -159,7 +159,7 @@ fn bumpslopes_come_back_for_heights_and_normals() {
     let path = folder.path().join("b.exr");
     for builtin in ["armour", "v-groove"] {
         let map = baked("slopes", builtin, Precision::Single);
-        write_bumpslopes(&path, &map).unwrap();
+        write_bumpslopes(&path, &map, map.pyramid.precision()).unwrap();
         let back = read_ndf(&path, &read_file(&path).unwrap()).unwrap().unwrap();
         assert_eq!(back.header, map.header);
         for (level, size) in map.pyramid.sizes().iter().enumerate() {
@@ -173,6 +173,6 @@ fn bumpslopes_come_back_for_heights_and_normals() {
         }
     }
     let naive = baked("naive", "armour", Precision::Half);
-    let error = write_bumpslopes(&path, &naive).unwrap_err().to_string();
+    let error = write_bumpslopes(&path, &naive, Precision::Half).unwrap_err().to_string();
     assert!(error.ends_with("holds the method `slopes`, not `naive`"));
 }

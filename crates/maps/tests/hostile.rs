@@ -21,7 +21,7 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
     let path = folder.path().join("map.exr");
     write_native(&path, &map).unwrap();
     all.push(("native.exr", std::fs::read(&path).unwrap()));
-    write_bumpslopes(&path, &map).unwrap();
+    write_bumpslopes(&path, &map, map.pyramid.precision()).unwrap();
     all.push(("bumpslopes.exr", std::fs::read(&path).unwrap()));
     all.push(("map.ktx2", ktx2()));
     all

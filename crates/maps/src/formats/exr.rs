@@ -306,7 +306,9 @@ fn read_bumpslopes(
 pub fn write_native(path: &Path, map: &NdfMap) -> Result<u64, MapError> {
     let pyramid = &map.pyramid;
     let layers = (0..pyramid.layers()).map(|layer| {
-        let levels = |channel: usize| mip(pyramid, |level| channel_of(pyramid, level, layer, channel));
+        let levels = |channel: usize| {
+            mip(pyramid, pyramid.precision(), |level| channel_of(pyramid, level, layer, channel))
+        };
         let channels =
             ["R", "G", "B", "A"].iter().enumerate().map(|(c, name)| AnyChannel::new(*name, levels(c)));
         (format!("layer{layer}"), AnyChannels::sort(channels.collect()))
@@ -314,11 +316,13 @@ pub fn write_native(path: &Path, map: &NdfMap) -> Result<u64, MapError> {
     write_layers(path, map, layers.collect())
 }
 
-/// Writes OpenImageIO's six channels; returns the file's length.
+/// Writes OpenImageIO's six channels in this precision; returns the file's length.
+///
+/// Heights change their units on the way, so give a map in single precision to have them rounded once.
 ///
 /// # Errors
 /// [`MapError`] when the map's method is not `slopes` or the file cannot be written.
-pub fn write_bumpslopes(path: &Path, map: &NdfMap) -> Result<u64, MapError> {
+pub fn write_bumpslopes(path: &Path, map: &NdfMap, precision: Precision) -> Result<u64, MapError> {
     if map.header.method != "slopes" {
         let reason = format!("the bumpslopes layout holds the method `slopes`, not `{}`", map.header.method);
         return Err(MapError::unsupported(path, reason));
@@ -343,7 +347,7 @@ pub fn write_bumpslopes(path: &Path, map: &NdfMap) -> Result<u64, MapError> {
                 .for_each(|v| *v = if is_normal && *name == BUMPSLOPES[0] { -1.0 } else { *v * unit });
             values
         };
-        AnyChannel::new(*name, mip(pyramid, values))
+        AnyChannel::new(*name, mip(pyramid, precision, values))
     };
     let channels = AnyChannels::sort(BUMPSLOPES.iter().zip(places).map(channel).collect());
     write_layers(path, map, vec![(String::new(), channels)])
@@ -352,15 +356,18 @@ pub fn write_bumpslopes(path: &Path, map: &NdfMap) -> Result<u64, MapError> {
 fn channel_of(pyramid: &Pyramid, level: usize, layer: usize, channel: usize) -> Vec<f32> {
     let bytes = pyramid.level_bytes(level);
     let length = bytes.len() / pyramid.layers();
-    let mut values = Vec::new();
-    pyramid.precision().unpack(&bytes[layer * length..][..length], &mut values);
-    values.into_iter().skip(channel).step_by(4).collect()
+    let (precision, texel) = (pyramid.precision(), pyramid.precision().texel_bytes());
+    let mut values = Vec::with_capacity(length / texel);
+    for rgba in bytes[layer * length..][..length].chunks_exact(texel) {
+        precision.unpack(&rgba[channel * texel / 4..][..texel / 4], &mut values);
+    }
+    values
 }
 
-fn mip(pyramid: &Pyramid, values: impl Fn(usize) -> Vec<f32>) -> Levels<FlatSamples> {
+fn mip(pyramid: &Pyramid, precision: Precision, values: impl Fn(usize) -> Vec<f32>) -> Levels<FlatSamples> {
     let store = |level| {
         let values = values(level);
-        match pyramid.precision() {
+        match precision {
             Precision::Half => FlatSamples::F16(values.into_iter().map(f16::from_f32).collect()),
             Precision::Single => FlatSamples::F32(values),
         }

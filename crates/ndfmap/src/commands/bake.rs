@@ -6,6 +6,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use ndfmap_core::bake::{Bake as CoreBake, BakeReport};
 use ndfmap_core::ndf::Method;
+use ndfmap_core::pyramid;
 use ndfmap_maps::formats::exr::{write_bumpslopes, write_native};
 use ndfmap_maps::formats::ktx2::Ktx2Sink;
 use ndfmap_maps::source::{SourceMap, read_source};
@@ -120,12 +121,10 @@ impl Bake {
 
     fn bake(&self, target: Target, map: &SourceMap, method: &dyn Method) -> Result<Done, Failure> {
         let progress = Progress::new(&method.spelling());
-        let bake = CoreBake {
-            surface: &*map.surface,
-            method,
-            precision: self.precision.into(),
-            progress: &|f| progress.set(f),
-        };
+        // Bumpslopes of heights change their units, so they are rounded when written, and only then.
+        let converts = target == Target::Bumpslopes && map.surface.has_height();
+        let precision = if converts { pyramid::Precision::Single } else { self.precision.into() };
+        let bake = CoreBake { surface: &*map.surface, method, precision, progress: &|f| progress.set(f) };
         let header = header_of(map, method);
         let start = Instant::now();
         if target == Target::Ktx2 {
@@ -142,7 +141,7 @@ impl Bake {
         let baked = start.elapsed().as_secs_f64();
         let map = NdfMap { header, pyramid };
         let bytes = match target {
-            Target::Bumpslopes => write_bumpslopes(&self.output, &map)?,
+            Target::Bumpslopes => write_bumpslopes(&self.output, &map, self.precision.into())?,
             _ => write_native(&self.output, &map)?,
         };
         Ok(Done { bytes, bake: baked, write: start.elapsed().as_secs_f64() - baked })
