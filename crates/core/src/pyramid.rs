@@ -25,7 +25,6 @@ pub fn level_sizes(finest: Size) -> Vec<Size> {
 /// The run of fine texels under coarse texel `i` on one axis, with the fraction each contributes.
 ///
 /// Fractions are ratios of integers and sum to one within rounding.
-#[must_use]
 pub fn footprint(fine: usize, coarse: usize, i: usize) -> (Range<usize>, impl Fn(usize) -> f64) {
     // Scaled by `coarse`, fine texel j covers [j coarse, (j+1) coarse), coarse texel i [i fine, (i+1) fine).
     let (start, end) = (i * fine, (i + 1) * fine);

@@ -106,7 +106,7 @@ impl SlopeVariance {
     /// The wider of this and nothing: clamps rounding below zero, and NaN, to zero.
     #[must_use]
     pub fn clamped(value: f64) -> Self {
-        Self(value.max(0.0).min(f64::MAX))
+        Self(if value > 0.0 { value.min(f64::MAX) } else { 0.0 })
     }
 
     /// Convolution of two lobes adds their variances.

@@ -1,5 +1,7 @@
 //! Surfaces whose answers are known in closed form.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
+
 use glam::DVec3;
 use ndfmap_core::bake::Bake;
 use ndfmap_core::error::{DISK_RADIUS, Truth};

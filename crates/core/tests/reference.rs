@@ -1,5 +1,7 @@
 //! Against values from an independent implementation: `tests/reference/generate.py` (numpy and scipy).
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
+
 use glam::{DVec3, Vec3};
 use ndfmap_core::bake::Bake;
 use ndfmap_core::error::Truth;

@@ -36,8 +36,7 @@ impl AtomicFile {
         // Readable as any new file is; the crate's default is for secrets.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
-        let made =
-            builder.prefix(".ndfmap-").tempfile_in(folder).map_err(|e| MapError::io(target, e.into()))?;
+        let made = builder.prefix(".ndfmap-").tempfile_in(folder).map_err(|e| MapError::io(target, e))?;
         let (file, temporary) = made.into_parts();
         unfinished().push(temporary.to_path_buf());
         Ok(Self { file, temporary, target: target.to_owned() })

@@ -1,5 +1,7 @@
 //! Every format reads what it should, and what is written comes back.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
+
 mod common;
 
 use std::path::Path;

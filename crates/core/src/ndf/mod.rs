@@ -249,6 +249,9 @@ impl<R: Representation> Method for R {
     }
 }
 
+/// Reads what follows a method's name, split at colons; the error says what is wrong.
+pub type Parse = fn(&[&str]) -> Result<Box<dyn Method>, String>;
+
 /// A row of [`TABLE`].
 pub struct Row {
     /// The word before the first colon.
@@ -260,7 +263,7 @@ pub struct Row {
     /// Where it was published.
     pub paper: &'static str,
     /// Reads what follows the name, split at colons.
-    pub parse: fn(&[&str]) -> Result<Box<dyn Method>, String>,
+    pub parse: Parse,
     /// Spellings that the conformance suite runs, the plain one first.
     pub samples: &'static [&'static str],
 }

@@ -54,8 +54,9 @@ pub struct Ndm {
 
 pub(super) const ROW: Row = Row {
     name: "ndm",
-    parameters: "[:brdf|gaussian|pearson][:partial|integrated|plane]",
-    summary: "3-D Gaussian of the normals, restricted to the sphere",
+    parameters: "[:KERNEL][:NORMALISATION]",
+    summary: "3-D Gaussian of the normals, restricted to the sphere; kernels brdf, gaussian, pearson; \
+              normalisations partial, integrated, plane",
     paper: "Olano and North 1997",
     parse,
     samples: &[
@@ -80,7 +81,11 @@ fn parse(words: &[&str]) -> Result<Box<dyn Method>, String> {
             "partial" => ndm.normalisation = Normalisation::Partial,
             "integrated" => ndm.normalisation = Normalisation::Integrated,
             "plane" => ndm.normalisation = Normalisation::Plane,
-            other => return Err(format!("`{other}` is no kernel and no normalisation: {}", ROW.parameters)),
+            other => {
+                return Err(format!(
+                    "`{other}` is no kernel (brdf, gaussian, pearson) and no normalisation (partial, integrated, plane)"
+                ));
+            }
         }
     }
     if ndm.kernel == Kernel::Brdf && ndm.normalisation == Normalisation::Integrated {

@@ -19,7 +19,7 @@ pub(super) const ROW: Row = Row {
     summary: "straight grooves with two flanks, the simplest two-lobed surface",
     build: |size: Size| {
         let normal = |x: usize, _| {
-            let rising = (x * FLANKS / size.width) % 2 == 0;
+            let rising = (x * FLANKS / size.width).is_multiple_of(2);
             normal_of_slope(Vec2::new(if rising { GROOVE_SLOPE } else { -GROOVE_SLOPE }, 0.0))
         };
         Box::new(NormalGrid { normals: Grid::from_fn(size, normal), wraps: Wraps::default() })

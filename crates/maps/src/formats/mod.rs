@@ -16,6 +16,12 @@ use std::path::Path;
 
 use crate::{Image, MapError, NdfMap};
 
+/// Reads a picture from a whole file.
+pub type ReadImage = fn(&Path, &[u8]) -> Result<Image, MapError>;
+
+/// Reads a normal distribution map from a whole file; `None` when the file is a plain picture.
+pub type ReadNdf = fn(&Path, &[u8]) -> Result<Option<NdfMap>, MapError>;
+
 /// A row of [`TABLE`].
 pub struct Format {
     /// Name for messages.
@@ -25,9 +31,9 @@ pub struct Format {
     /// First bytes that give it away; empty for a format that has none.
     pub magic: &'static [&'static [u8]],
     /// Reads a picture.
-    pub read_image: Option<fn(&Path, &[u8]) -> Result<Image, MapError>>,
+    pub read_image: Option<ReadImage>,
     /// Reads a normal distribution map; `None` inside when the file is a plain picture.
-    pub read_ndf: Option<fn(&Path, &[u8]) -> Result<Option<NdfMap>, MapError>>,
+    pub read_ndf: Option<ReadNdf>,
 }
 
 /// Every format there is.

@@ -1,5 +1,7 @@
 //! Small files of every format, made in memory.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
+
 use std::io::Cursor;
 
 use ndfmap_core::bake::Bake;

@@ -43,10 +43,11 @@ pub(super) struct Compare {
 
 impl Compare {
     pub(super) fn run(self, json: bool) -> Result<(), Failure> {
-        let mut methods = Vec::new();
+        let mut methods: Vec<Box<dyn Method>> = Vec::new();
         for spelling in &self.methods {
             let method = method(spelling)?;
-            if methods.iter().all(|m: &Box<dyn Method>| m.spelling() != method.spelling()) {
+            // Two spellings of one method would share a key in the JSON.
+            if methods.iter().all(|m| m.spelling() != method.spelling()) {
                 methods.push(method);
             }
         }

@@ -1,6 +1,6 @@
 //! The command line: what all commands share, and the table of commands.
 //!
-//! A command is one file here and one row of [`Command`]. Rules that every one of them keeps:
+//! A command is one file here and one row of `Command`. Rules that every one of them keeps:
 //! `--json` prints exactly one document on stdout and everything else goes to stderr; exit status 0 done,
 //! 1 failed, 2 wrong usage; nothing is overwritten without saying so.
 

@@ -1,0 +1,190 @@
+//! What ARCHITECTURE.md and CONTRIBUTING.md promise, held by tests.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
+
+mod common;
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use common::root;
+
+/// Our own crates that a crate depends on, straight from cargo.
+fn own_dependencies(package: &str) -> BTreeSet<String> {
+    let output = Command::new(env!("CARGO"))
+        .args(["tree", "--offline", "--edges", "normal,build", "--prefix", "none", "--package", package])
+        .current_dir(root())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    text.lines()
+        .filter_map(|l| l.split(' ').next())
+        .filter(|n| n.starts_with("ndfmap") && *n != package)
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn arrows_point_one_way() {
+    let set = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect::<BTreeSet<_>>();
+    assert_eq!(own_dependencies("ndfmap-core"), set(&[]));
+    assert_eq!(own_dependencies("ndfmap-maps"), set(&["ndfmap-core"]));
+    assert_eq!(own_dependencies("ndfmap"), set(&["ndfmap-core", "ndfmap-maps"]));
+}
+
+#[test]
+fn core_opens_no_file_device_or_window() {
+    let output = Command::new(env!("CARGO"))
+        .args([
+            "tree",
+            "--offline",
+            "--edges",
+            "normal",
+            "--prefix",
+            "none",
+            "--depth",
+            "1",
+            "--package",
+            "ndfmap-core",
+        ])
+        .current_dir(root())
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let found: BTreeSet<&str> =
+        text.lines().filter_map(|l| l.split(' ').next()).filter(|n| *n != "ndfmap-core").collect();
+    let allowed =
+        ["bytemuck", "fearless_simd", "glam", "half", "libm", "rand", "rand_pcg", "rayon", "thiserror"];
+    assert_eq!(found, allowed.into_iter().collect());
+}
+
+/// Files that git tracks, or all but build output where there is no git.
+fn tracked() -> Vec<PathBuf> {
+    let output = Command::new("git")
+        .args(["ls-files", "--cached", "--others", "--exclude-standard"])
+        .current_dir(root())
+        .output()
+        .unwrap();
+    String::from_utf8_lossy(&output.stdout)
+        .lines()
+        .map(PathBuf::from)
+        .filter(|f| root().join(f).exists())
+        .collect()
+}
+
+fn read(file: &Path) -> String {
+    std::fs::read_to_string(root().join(file)).unwrap_or_else(|e| panic!("{}: {e}", file.display()))
+}
+
+#[test]
+fn every_source_file_says_its_purpose_and_none_is_huge() {
+    for file in tracked().iter().filter(|f| f.extension().is_some_and(|e| e == "rs")) {
+        let text = read(file);
+        let fuzz = file.starts_with("fuzz") && text.starts_with("#![no_main]");
+        assert!(
+            text.starts_with("//!") || fuzz && text.contains("//!"),
+            "{} has no purpose line",
+            file.display()
+        );
+        assert!(text.lines().count() <= 800, "{} is too long for one idea", file.display());
+        let allow = regex_free_allow(&text);
+        assert!(allow.is_none(), "{}: an allow without a reason: {allow:?}", file.display());
+    }
+}
+
+/// An `allow` attribute that gives no reason, if there is one.
+fn regex_free_allow(text: &str) -> Option<String> {
+    let opening = concat!("[all", "ow(");
+    text.match_indices(opening)
+        .map(|(at, _)| text[at..].split(")]").next().unwrap_or(""))
+        .find(|a| !a.contains("reason"))
+        .map(str::to_owned)
+}
+
+#[test]
+fn every_path_in_the_documents_exists() {
+    let root = root();
+    for file in tracked().iter().filter(|f| f.extension().is_some_and(|e| e == "md")) {
+        let folder = root.join(file).parent().unwrap().to_owned();
+        for code in read(file).split('`').skip(1).step_by(2) {
+            // A path is code with a slash and no blanks, of one of our folders, or a Markdown page.
+            let ours = ["crates/", "docs/", "tests/", "fuzz/", "scripts/", "testdata/", ".ci/"];
+            let is_path = !code.contains([' ', '<', '*', '{', '\n'])
+                && (ours.iter().any(|o| code.starts_with(o)) || code.ends_with(".md") && !code.contains(':'));
+            if is_path {
+                assert!(
+                    root.join(code).exists() || folder.join(code).exists(),
+                    "{} names {code}",
+                    file.display()
+                );
+            }
+        }
+        for (_, rest) in read(file).match_indices("](").map(|(at, _)| ((), read(file)[at + 2..].to_owned())) {
+            let link =
+                rest.split(')').next().unwrap_or_default().split('#').next().unwrap_or_default().to_owned();
+            if !link.is_empty() && !link.starts_with("http") {
+                assert!(folder.join(&link).exists(), "{} links to {link}", file.display());
+            }
+        }
+    }
+}
+
+#[test]
+fn every_command_in_the_documents_runs() {
+    // Commands are the lines of `sh` blocks that begin with `ndfmap` or `cargo run --release --`. They run in a folder
+    // of their own, on built-in maps; lines about a reader's own files are marked by a name in capitals.
+    let folder = tempfile::tempdir().unwrap();
+    let mut ran = 0;
+    for file in tracked().iter().filter(|f| f.extension().is_some_and(|e| e == "md")) {
+        let text = read(file);
+        for block in text.split("```sh\n").skip(1).filter_map(|b| b.split("```").next()) {
+            for line in block.lines() {
+                let line = line.split(" #").next().unwrap_or_default().trim();
+                let words =
+                    line.strip_prefix("ndfmap ").or_else(|| line.strip_prefix("cargo run --release -- "));
+                let Some(words) = words.filter(|w| !w.contains("MY_")) else { continue };
+                let output = Command::new(env!("CARGO_BIN_EXE_ndfmap"))
+                    .args(words.split_whitespace())
+                    .current_dir(folder.path())
+                    .output()
+                    .unwrap();
+                let said = String::from_utf8_lossy(&output.stderr).into_owned();
+                assert!(output.status.success(), "{}: {line}\n{said}", file.display());
+                ran += 1;
+            }
+        }
+    }
+    assert!(ran >= 5, "only {ran} commands found");
+}
+
+#[test]
+fn tables_in_the_documents_are_those_of_the_code() {
+    let methods = read(Path::new("docs/methods.md"));
+    for row in ndfmap_core::ndf::TABLE {
+        assert!(
+            methods.contains(&format!("`{}{}`", row.name, row.parameters)),
+            "docs/methods.md lacks {}",
+            row.name
+        );
+    }
+    for row in ndfmap_core::brdf::TABLE {
+        assert!(
+            methods.contains(&format!("`{}{}`", row.name, row.parameter)),
+            "docs/methods.md lacks {}",
+            row.name
+        );
+    }
+    let readme = read(Path::new("README.md"));
+    for row in ndfmap_core::ndf::TABLE {
+        assert!(readme.contains(&format!("`{}", row.name)), "README.md lacks {}", row.name);
+    }
+    let formats = read(Path::new("docs/formats.md"));
+    for row in ndfmap_maps::formats::TABLE {
+        assert!(formats.contains(row.name), "docs/formats.md lacks {}", row.name);
+    }
+    for row in ndfmap_core::procedural::TABLE {
+        assert!(methods.contains(&format!("`builtin:{}`", row.name)), "docs/methods.md lacks {}", row.name);
+    }
+}

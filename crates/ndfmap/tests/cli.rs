@@ -1,0 +1,257 @@
+//! The command line: what scripts rely on, and what happens when it is used wrongly.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
+
+mod common;
+
+use std::path::Path;
+
+use common::{json, ndfmap};
+use serde_json::Value;
+
+fn text(path: &Path) -> String {
+    path.display().to_string()
+}
+
+/// Status, stdout and stderr.
+fn outcome(words: &[&str]) -> (i32, String, String) {
+    let output = ndfmap(words);
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code().unwrap(), text(&output.stdout), text(&output.stderr))
+}
+
+#[test]
+fn bake_then_inspect_every_method() {
+    let folder = tempfile::tempdir().unwrap();
+    for (method, layers, key) in [
+        ("fixed", 1, "mean"),
+        ("naive", 1, "mean"),
+        ("toksvig", 1, "mean"),
+        ("ndm", 3, "covariance"),
+        ("ndm:pearson:integrated", 3, "covariance"),
+        ("slopes", 2, "height"),
+        ("sh:3", 4, "coefficients"),
+    ] {
+        for extension in ["ktx2", "exr"] {
+            let file = text(&folder.path().join(format!("map.{extension}")));
+            let baked =
+                json(&["bake", "builtin:armour", "--size", "48x20", "-m", method, "-o", &file, "--json"]);
+            for name in [
+                "method", "width", "height", "levels", "layers", "format", "bytes", "threads", "seconds",
+                "warnings",
+            ] {
+                assert!(!baked[name].is_null(), "{name}");
+            }
+            assert_eq!((baked["layers"].as_u64(), baked["levels"].as_u64()), (Some(layers), Some(6)));
+            assert_eq!(baked["bytes"].as_u64().unwrap(), std::fs::metadata(&file).unwrap().len());
+            assert!(["read", "bake", "write"].iter().all(|s| baked["seconds"][*s].as_f64().unwrap() >= 0.0));
+            let told = json(&["inspect", &file, "--json"]);
+            assert_eq!(told["method"], method);
+            assert_eq!(told["levels"][5], serde_json::json!({ "width": 1, "height": 1 }));
+            assert_eq!(told["source"]["file"], "builtin:armour");
+            let texel = json(&["inspect", &file, "--json", "--texel", "2", "3", "4"]);
+            assert_eq!(
+                (texel["level"].as_u64(), texel["x"].as_u64(), texel["y"].as_u64()),
+                (Some(2), Some(3), Some(4))
+            );
+            assert!(!texel[key].is_null(), "{method} {texel}");
+        }
+    }
+}
+
+#[test]
+fn compare_prints_one_document_and_a_report_stands_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = text(&folder.path().join("report"));
+    let compared = json(&[
+        "compare",
+        "builtin:foil",
+        "--size",
+        "64",
+        "--methods",
+        "naive,toksvig,slopes",
+        "--json",
+        "--report",
+        &report,
+    ]);
+    assert_eq!(compared["brdf"], "blinn-phong:50");
+    let error =
+        |method: &str, level: usize| compared["methods"][method]["levels"][level]["error"].as_f64().unwrap();
+    assert_eq!(compared["methods"]["slopes"]["bytes_per_texel"], 16);
+    assert_eq!(compared["methods"]["naive"]["levels"].as_array().unwrap().len(), 7);
+    // What the project exists for: keeping the spread beats forgetting it.
+    assert!(error("toksvig", 5) < 0.5 * error("naive", 5));
+    let page = std::fs::read_to_string(Path::new(&report).join("report.html")).unwrap();
+    assert!(
+        page.contains("<svg") && page.contains("data:image/png;base64,") && page.contains("builtin:foil")
+    );
+    assert!(
+        !page.contains("http://")
+            || page.matches("http://").count() == page.matches("http://www.w3.org").count()
+    );
+    assert!(!page.contains("<script") && !page.contains("<link"));
+    for picture in ["contact-sheet.png", "ndf.png"] {
+        let bytes = std::fs::read(Path::new(&report).join(picture)).unwrap();
+        let reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
+        assert!(reader.info().width > 300 && reader.info().height > 200);
+    }
+    let (_, _, said) =
+        outcome(&["compare", "builtin:foil", "--size", "16", "--methods", "naive", "--report", &report]);
+    assert!(said.contains("replacing"), "{said}");
+}
+
+#[test]
+fn demo_needs_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = text(&folder.path().join("demo"));
+    let told = json(&["demo", "-o", &output, "--json"]);
+    assert!(told["seconds"].as_f64().unwrap() < 60.0);
+    for file in told["files"].as_array().unwrap() {
+        assert!(Path::new(file.as_str().unwrap()).exists());
+    }
+    let (status, table, _) = outcome(&["demo", "-o", &output]);
+    assert!(status == 0 && table.contains("toksvig") && table.contains("report.html"));
+}
+
+#[test]
+fn the_same_file_for_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let bake = |threads: &str, name: &str| {
+        let file = text(&folder.path().join(name));
+        json(&[
+            "bake",
+            "builtin:foil",
+            "--size",
+            "211x130",
+            "-m",
+            "ndm",
+            "-o",
+            &file,
+            "--threads",
+            threads,
+            "--json",
+        ]);
+        std::fs::read(file).unwrap()
+    };
+    for extension in ["ktx2", "exr"] {
+        let one = bake("1", &format!("1.{extension}"));
+        assert!(one == bake("2", &format!("2.{extension}")) && one == bake("8", &format!("8.{extension}")));
+    }
+}
+
+#[test]
+fn odd_shapes_bake() {
+    let folder = tempfile::tempdir().unwrap();
+    for size in ["1", "1x4096", "4096x1", "3x5", "745"] {
+        let file = text(&folder.path().join("map.ktx2"));
+        json(&["bake", "builtin:ripples", "--size", size, "-o", &file, "--json"]);
+        let told = json(&["inspect", &file, "--json"]);
+        let last = told["levels"].as_array().unwrap().last().unwrap().clone();
+        assert_eq!(last, serde_json::json!({ "width": 1, "height": 1 }));
+    }
+    let compared =
+        json(&["compare", "builtin:foil", "--size", "1x37", "--methods", "slopes,naive", "--json"]);
+    assert!(compared["methods"]["slopes"]["levels"][5]["error"].as_f64().unwrap().is_finite());
+}
+
+#[test]
+fn wrong_usage_is_2_and_suggests() {
+    for (words, why) in [
+        (vec!["bake", "builtin:foil", "-o", "a.ktx2", "-m", "toksvi"], "did you mean `toksvig`"),
+        (vec!["bake", "builtin:foil", "-o", "a.ktx2", "-m", "sh:99"], "whole number from 2 to 16"),
+        (vec!["bake", "builtin:foil", "-o", "a.png"], "maps are written as .ktx2 or .exr"),
+        (
+            vec!["bake", "builtin:foil", "-o", "a.ktx2", "--layout", "bumpslopes"],
+            "needs an output ending in .exr",
+        ),
+        (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--methd", "naive"], "--method"),
+        (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--height-scale", "-1"], "above 0"),
+        (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--wrap", "mirror"], "neither `repeat` nor `clamp`"),
+        (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--size", "0"], "no side from 1"),
+        (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--threads", "0"], "threads"),
+        (vec!["compare", "builtin:foil", "--brdf", "gxx:0.2"], "did you mean `ggx`"),
+        (vec!["compare", "builtin:foil", "--brdf", "ggx:7"], "between 0.0001 and 1"),
+        (vec!["inspect", "builtin:foil", "--texel", "0", "0", "0"], "no baked map"),
+        (vec!["bkae"], "bake"),
+        (vec![], "Usage"),
+    ] {
+        let (status, stdout, stderr) = outcome(&words);
+        assert_eq!(status, 2, "{words:?} {stderr}");
+        assert!(stdout.is_empty() && stderr.contains(why), "{words:?}: {stderr}");
+        assert!(!Path::new("a.ktx2").exists());
+    }
+}
+
+#[test]
+fn failures_are_1_and_leave_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = text(&folder.path().join("good.ktx2"));
+    json(&["bake", "builtin:foil", "--size", "8", "-o", &good, "--json"]);
+    let cut = folder.path().join("cut.ktx2");
+    let bytes = std::fs::read(&good).unwrap();
+    std::fs::write(&cut, &bytes[..bytes.len() / 2]).unwrap();
+    std::fs::create_dir(folder.path().join("folder.ktx2")).unwrap();
+    let path = |name: &str| text(&folder.path().join(name));
+    let before = std::fs::read_dir(folder.path()).unwrap().count();
+    for (words, why) in [
+        (vec!["bake", "builtin:nothing", "-o", &path("x.ktx2")], "there is no built-in surface `nothing`"),
+        (vec!["bake", &path("none.png"), "-o", &path("x.ktx2")], "none.png"),
+        (vec!["bake", &text(folder.path()), "-o", &path("x.ktx2")], "is a folder, not a file"),
+        (vec!["bake", &good, "-o", &path("x.ktx2")], "KTX2 files are not read as pictures"),
+        (vec!["bake", "builtin:foil", "-o", &path("folder.ktx2")], "is a folder, not a file"),
+        (vec!["bake", "builtin:foil", "-o", &path("no/such/x.ktx2")], "x.ktx2"),
+        (vec!["bake", "builtin:foil", "-o", "/dev/null/x.exr"], "x.exr"),
+        (vec!["inspect", &text(&cut)], "is truncated"),
+        (vec!["compare", "builtin:foil", "--report", &good], "good.ktx2"),
+    ] {
+        let (status, stdout, stderr) = outcome(&words);
+        assert_eq!(status, 1, "{words:?} {stderr}");
+        assert!(stdout.is_empty() && stderr.contains(why), "{words:?}: {stderr}");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), before, "{words:?}");
+    }
+    let (status, _, stderr) = outcome(&["inspect", &good, "--texel", "0", "8", "0"]);
+    assert!(status == 2 && stderr.contains("level 0 is 8 × 8"), "{stderr}");
+}
+
+#[test]
+fn heights_too_large_for_half_floats_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = folder.path().join("h.png");
+    let mut encoder = png::Encoder::new(std::fs::File::create(&picture).unwrap(), 4, 4);
+    encoder.set_color(png::ColorType::Grayscale);
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_image_data(&[255; 16]).unwrap();
+    writer.finish().unwrap();
+    let output = text(&folder.path().join("x.ktx2"));
+    let words = ["bake", &text(&picture), "-o", &output, "--height-scale", "1e6"];
+    let (status, _, stderr) = outcome(&words);
+    assert!(status == 1 && stderr.contains("too large for half floats"), "{stderr}");
+    assert!(!Path::new(&output).exists());
+    let baked: Value = json(&[&words[..], &["--precision", "single", "--json"]].concat());
+    assert_eq!(baked["width"], 4);
+}
+
+#[cfg(unix)]
+#[test]
+fn interrupted_bakes_leave_nothing() {
+    use std::process::{Command, Stdio};
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("big.ktx2");
+    // Factors by integration take long enough to be caught in the act.
+    let mut child = Command::new(env!("CARGO_BIN_EXE_ndfmap"))
+        .args(["bake", "builtin:foil", "--size", "4096", "-m", "ndm:gaussian:integrated", "-o"])
+        .arg(&output)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let begun = || std::fs::read_dir(folder.path()).unwrap().count() > 0;
+    let start = std::time::Instant::now();
+    while !begun() && start.elapsed().as_secs() < 60 {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    assert!(begun(), "the bake never began to write");
+    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}

@@ -1,0 +1,24 @@
+//! Runs the program as a user would.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
+#![allow(dead_code, reason = "every test file is a crate of its own and uses its own part of this one")]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// The repository's root.
+pub(crate) fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// Runs `ndfmap` with these words.
+pub(crate) fn ndfmap<S: AsRef<std::ffi::OsStr>>(words: &[S]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_ndfmap")).args(words).output().unwrap()
+}
+
+/// Runs it, expects success, and reads its JSON.
+pub(crate) fn json<S: AsRef<std::ffi::OsStr>>(words: &[S]) -> serde_json::Value {
+    let output = ndfmap(words);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
