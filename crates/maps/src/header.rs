@@ -29,9 +29,6 @@ pub struct Header {
     pub attributes: Vec<String>,
     /// What it was baked from.
     pub source: Source,
-    /// Errors measured against the source, when they were.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub errors: Option<Vec<Measured>>,
 }
 
 /// What a map was baked from.
@@ -59,17 +56,6 @@ pub enum SourceKind {
     Normal,
     /// A height map.
     Height,
-}
-
-/// One measured error.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Measured {
-    /// The BRDF's spelling.
-    pub brdf: String,
-    /// The level.
-    pub level: usize,
-    /// Relative L2 error.
-    pub error: f64,
 }
 
 impl Header {

@@ -13,6 +13,6 @@ mod ndf_map;
 pub mod source;
 
 pub use error::MapError;
-pub use header::{Header, Measured, Source, SourceKind, VERSION};
+pub use header::{Header, Source, SourceKind, VERSION};
 pub use image::{Image, MAX_SIDE, MAX_TEXELS, Samples};
 pub use ndf_map::NdfMap;

@@ -270,7 +270,6 @@ fn read_bumpslopes(
                 encoding: "sums".to_owned(),
                 attributes: Vec::new(),
                 source,
-                errors: None,
             }
         }
     };

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use ::image::codecs::jpeg::JpegDecoder;
 
-use super::{Format, hdr::read_integers};
+use super::{Format, decoded::read_integers};
 use crate::{Image, MapError};
 
 pub(super) const FORMAT: Format = Format {

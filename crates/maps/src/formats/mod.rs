@@ -4,6 +4,7 @@
 //! Every reader gets the whole file in memory (so nothing is larger than the file itself allows) and
 //! checks sizes before it allocates for them.
 
+mod decoded;
 pub mod exr;
 mod hdr;
 mod jpeg;

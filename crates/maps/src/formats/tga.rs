@@ -5,7 +5,7 @@ use std::path::Path;
 
 use ::image::codecs::tga::TgaDecoder;
 
-use super::{Format, hdr::read_integers};
+use super::{Format, decoded::read_integers};
 use crate::image::check_size;
 use crate::{Image, MapError};
 

@@ -105,7 +105,6 @@ pub(crate) fn baked(method: &str, builtin: &str, precision: Precision) -> NdfMap
         encoding: method.encoding().to_owned(),
         attributes: Vec::new(),
         source: map.source,
-        errors: None,
     };
     NdfMap { header, pyramid: bake.to_pyramid().0 }
 }

@@ -174,6 +174,5 @@ pub(super) fn header_of(map: &SourceMap, method: &dyn Method) -> Header {
         encoding: method.encoding().to_owned(),
         attributes: Vec::new(),
         source: map.source.clone(),
-        errors: None,
     }
 }

@@ -6,11 +6,15 @@
 //! can while they are in cache, so the finest levels are never held in floats. Bands are fixed by the map,
 //! not by the number of threads, so the bytes are too.
 
-use std::ops::Range;
+mod average;
+mod plan;
+
 use std::sync::{Mutex, PoisonError};
 
-use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
+
+use self::average::{RowAverager, Sums, copy_row, halve};
+use self::plan::{BAND, Band, Plan, split_layers};
 
 use crate::grid::Size;
 use crate::ndf::Method;
@@ -63,12 +67,6 @@ pub struct BakeReport {
     /// Channels too large for the precision, which became infinite.
     pub overflowed: usize,
 }
-
-/// Level-1 rows that one task makes: enough to carry through [`CASCADE`] levels.
-const BAND: usize = 8;
-
-/// Coarse levels that a band makes, at most: 8 rows become 4, 2 and 1.
-const CASCADE: usize = 4;
 
 /// Tasks a thread may have waiting for the sink at once.
 const WAVE: usize = 4;
@@ -303,78 +301,6 @@ fn write_rows<S: LevelSink>(
         .try_for_each(|(layer, bytes)| sink.write_rows(Place { level, layer, row }, bytes.as_ref()))
 }
 
-/// Splits layers that lie one after another into bands of these lengths: for each band, its part of every layer.
-fn split_layers<'a, T>(data: &'a mut [T], layers: usize, lengths: &[usize]) -> Vec<Vec<&'a mut [T]>> {
-    let mut bands: Vec<Vec<&mut [T]>> = lengths.iter().map(|_| Vec::with_capacity(layers)).collect();
-    let mut rest = data;
-    for _ in 0..layers {
-        for (band, length) in bands.iter_mut().zip(lengths) {
-            let (part, after) = rest.split_at_mut(*length);
-            band.push(part);
-            rest = after;
-        }
-    }
-    bands
-}
-
-/// Sizes of all levels, and which of them bands reach.
-struct Plan {
-    layout: Layout,
-    sizes: Vec<Size>,
-    /// Last level that bands make; its sums are kept for the levels beyond.
-    kept: usize,
-}
-
-impl Plan {
-    fn new(layout: Layout) -> Self {
-        let sizes = level_sizes(layout.size);
-        let halves =
-            |l: &usize| sizes[l - 1] == Size { width: 2 * sizes[*l].width, height: 2 * sizes[*l].height };
-        let last = CASCADE.min(sizes.len() - 1);
-        let kept = (2..=last).take_while(halves).last().unwrap_or(1.min(last));
-        Self { layout, sizes, kept }
-    }
-
-    /// The level whose rows bands are counted in: 1, or 0 when there is no other.
-    fn unit(&self) -> Size {
-        self.sizes[1.min(self.kept)]
-    }
-
-    fn bands(&self) -> Vec<Band> {
-        let height = self.unit().height;
-        (0..height).step_by(BAND).map(|r| Band(r..(r + BAND).min(height))).collect()
-    }
-
-    fn row_bytes(&self, level: usize) -> usize {
-        self.sizes[level].width * self.layout.precision.texel_bytes()
-    }
-
-    /// The coarsest kept level finer than `level` whose texels nest in it; else 0, the surface.
-    fn nearest_nesting(&self, level: usize) -> usize {
-        let coarse = self.sizes[level];
-        let nests = |k: &usize| {
-            let fine = self.sizes[*k];
-            fine.width.is_multiple_of(coarse.width) && fine.height.is_multiple_of(coarse.height)
-        };
-        (self.kept..level).rev().find(nests).unwrap_or(0)
-    }
-}
-
-/// The rows of the unit level that one task makes.
-struct Band(Range<usize>);
-
-impl Band {
-    /// Rows of a level that this band stores: on level 0 those that begin in it.
-    fn rows(&self, plan: &Plan, level: usize) -> Range<usize> {
-        let (own, unit) = (plan.sizes[level].height, plan.unit().height);
-        self.0.start * own / unit..self.0.end * own / unit
-    }
-
-    fn bytes(&self, plan: &Plan, level: usize) -> usize {
-        self.rows(plan, level).len() * plan.row_bytes(level)
-    }
-}
-
 /// The stored rows of one level, layer by layer.
 type Stored<'a> = Vec<&'a mut [u8]>;
 
@@ -421,85 +347,6 @@ impl ScratchPool {
 
     fn give(&self, scratch: Scratch) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
-    }
-}
-
-/// One level in single floats: layers one after another, each rows of RGBA texels.
-#[derive(Clone)]
-struct Sums {
-    size: Size,
-    layers: usize,
-    values: Vec<f32>,
-}
-
-impl Sums {
-    fn zero(size: Size, layers: usize) -> Self {
-        Self { size, layers, values: vec![0.0; size.area() * 4 * layers] }
-    }
-}
-
-/// Gathers row `y` of every layer of `rows` × `width` RGBA texels, layer after layer.
-fn copy_row(sums: &[f32], (rows, width): (usize, usize), y: usize, out: &mut [f32]) {
-    let length = width * 4;
-    for (layer, out) in sums.chunks_exact(rows * length).zip(out.chunks_exact_mut(length)) {
-        out.copy_from_slice(&layer[y * length..][..length]);
-    }
-}
-
-/// Averages two by two, in every layer of `rows` × `width` RGBA texels.
-fn halve(sums: &[f32], (rows, width): (usize, usize), out: &mut Vec<f32>) {
-    out.clear();
-    out.resize(sums.len() / 4, 0.0);
-    let averager = RowAverager::new(width, width / 2);
-    for (two, out) in sums.chunks_exact(rows * width * 4).zip(out.chunks_exact_mut(rows * width)) {
-        for (two, out) in two.chunks_exact(width * 8).zip(out.chunks_exact_mut(width * 2)) {
-            averager.add(&two[..width * 4], 0.5, out);
-            averager.add(&two[width * 4..], 0.5, out);
-        }
-    }
-}
-
-/// Averages rows of RGBA texels from `fine` to `coarse` texels.
-struct RowAverager {
-    /// For each coarse texel its first fine one and the weights from there on; empty when pairs nest.
-    taps: Vec<(usize, Vec<f32>)>,
-}
-
-impl RowAverager {
-    fn new(fine: usize, coarse: usize) -> Self {
-        let tap = |i| {
-            let (range, weight) = footprint(fine, coarse, i);
-            (range.start, range.map(|j| weight(j) as f32).collect())
-        };
-        let taps = if fine == 2 * coarse { Vec::new() } else { (0..coarse).map(tap).collect() };
-        Self { taps }
-    }
-
-    /// Adds `weight` times the averaged row to `out`.
-    fn add(&self, finer: &[f32], weight: f32, out: &mut [f32]) {
-        let out = out.as_chunks_mut::<4>().0;
-        if self.taps.is_empty() {
-            // The same additions in the same order at every SIMD level, so the same bits.
-            dispatch!(Level::new(), _simd => add_pairs(finer, 0.5 * weight, out));
-            return;
-        }
-        let finer = finer.as_chunks::<4>().0;
-        for (o, (first, weights)) in out.iter_mut().zip(&self.taps) {
-            for (texel, w) in finer[*first..].iter().zip(weights) {
-                for c in 0..4 {
-                    o[c] += weight * w * texel[c];
-                }
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn add_pairs(finer: &[f32], weight: f32, out: &mut [[f32; 4]]) {
-    for (o, pair) in out.iter_mut().zip(finer.as_chunks::<8>().0) {
-        for c in 0..4 {
-            o[c] += weight * (pair[c] + pair[c + 4]);
-        }
     }
 }
 
