@@ -105,6 +105,14 @@ fn a_hostile_ktx2_data_format_descriptor_is_survived() {
 }
 
 #[test]
+fn an_exr_without_parts_is_refused() {
+    // Found by fuzzing: magic, version 2 with the multi-part flag, and an empty list of headers.
+    let bytes = [0x76, 0x2f, 0x31, 0x01, 2, 0x10, 0, 0, 0];
+    let error = read_ndf(Path::new("map.exr"), &bytes).unwrap_err().to_string();
+    assert!(error.starts_with("map.exr: "), "{error}");
+}
+
+#[test]
 fn huge_headers_are_refused_before_memory_is_taken() {
     let all = samples();
     let sample = |name: &str| all.iter().find(|(n, _)| *n == name).unwrap().1.clone();

@@ -48,6 +48,9 @@ type AnyLayer = Layer<AnyChannels<Levels<FlatSamples>>>;
 fn check_header(path: &Path, bytes: &[u8]) -> Result<(), MapError> {
     let meta =
         MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| MapError::invalid(path, e))?;
+    if meta.headers.is_empty() {
+        return Err(MapError::invalid(path, "is an OpenEXR file without any part"));
+    }
     let mut total = 0;
     for header in &meta.headers {
         let size = check_size(path, header.layer_size.width(), header.layer_size.height())?;
