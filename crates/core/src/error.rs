@@ -138,21 +138,24 @@ pub struct TrueLevel {
 /// The true lobes of every level; calls `progress` with the fraction done.
 ///
 /// Levels with more than [`MAX_TEXELS`] texels are sampled, with a fixed seed, so that two methods are
-/// measured on the same texels. A level whose parent's texels nest four by four is averaged from it.
+/// measured on the same texels. A level in whose texels those of a finer one nest is averaged from it.
 #[must_use]
 pub fn true_levels(truth: &Truth<'_>, progress: &(dyn Fn(f64) + Sync)) -> Vec<TrueLevel> {
     let sizes = level_sizes(truth.size);
     let mut levels: Vec<TrueLevel> = Vec::with_capacity(sizes.len());
     for (level, size) in sizes.iter().enumerate() {
         let texels = measured_texels(*size, level);
-        let nested = levels.last().filter(|finer| {
-            let parent = sizes[level - 1];
-            finer.texels.len() == parent.area()
-                && parent.width == 2 * size.width
-                && parent.height == 2 * size.height
+        // The coarsest finer level that was measured whole and whose texels nest in this one's.
+        let nested = levels.iter().rev().find(|finer| {
+            let fine = sizes[finer.level];
+            finer.texels.len() == fine.area()
+                && fine.width.is_multiple_of(size.width)
+                && fine.height.is_multiple_of(size.height)
         });
         let lobes = match nested {
-            Some(finer) => texels.iter().map(|t| mean_of_four(finer, sizes[level - 1], *t)).collect(),
+            Some(finer) => {
+                texels.par_iter().map(|t| mean_of_nested(finer, sizes[finer.level], *size, *t)).collect()
+            }
             None => texels.par_iter().map(|(x, y)| truth.texel(*size, *x, *y)).collect(),
         };
         levels.push(TrueLevel { level, texels, lobes });
@@ -176,10 +179,16 @@ fn measured_texels(size: Size, level: usize) -> Vec<(usize, usize)> {
     (0..SAMPLED_TEXELS).map(|_| at(random.random_range(0..size.area()))).collect()
 }
 
-fn mean_of_four(finer: &TrueLevel, parent: Size, (x, y): (usize, usize)) -> Vec<f64> {
-    let child = |dx: usize, dy: usize| &finer.lobes[(2 * y + dy) * parent.width + 2 * x + dx];
-    let four = [child(0, 0), child(1, 0), child(0, 1), child(1, 1)];
-    (0..four[0].len()).map(|i| four.iter().map(|lobe| lobe[i]).sum::<f64>() / 4.0).collect()
+fn mean_of_nested(finer: &TrueLevel, fine: Size, coarse: Size, (x, y): (usize, usize)) -> Vec<f64> {
+    let (columns, rows) = (fine.width / coarse.width, fine.height / coarse.height);
+    let mut mean = vec![0.0; finer.lobes[0].len()];
+    for j in y * rows..(y + 1) * rows {
+        for i in x * columns..(x + 1) * columns {
+            let child = &finer.lobes[j * fine.width + i];
+            mean.iter_mut().zip(child).for_each(|(sum, f)| *sum += f / (columns * rows) as f64);
+        }
+    }
+    mean
 }
 
 /// The error of a baked map at one level.

@@ -270,7 +270,7 @@ impl Pyramid {
     /// Anisotropic look-up: the mean of up to `max_taps` trilinear taps along the longer axis of the
     /// footprint, each at the level that the shorter axis asks for.
     ///
-    /// The footprint is the ellipse whose half-axes come from the pixel's derivatives of `uv`; its
+    /// The footprint is the ellipse whose axes come from the pixel's derivatives of `uv`; its
     /// axes are found exactly (singular values of the 2×2 derivative), not guessed from the longer column.
     #[must_use]
     pub fn anisotropic(&self, footprint: &PixelFootprint, max_taps: usize) -> Vec<f32> {

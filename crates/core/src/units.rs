@@ -59,7 +59,7 @@ unit!(
 );
 unit!(
     /// Exponent `s` of a Blinn-Phong lobe.
-    Exponent, "exponent", "above 0 and at most 1e6", |v| v > 0.0 && v <= 1e6
+    Exponent, "exponent", "between 0.001 and 1e6", |v| (1e-3..=1e6).contains(&v)
 );
 unit!(
     /// Width `sigma` of Han et al.'s Torrance-Sparrow lobe, in radians.

@@ -41,7 +41,7 @@ impl Brdf for Beckmann {
     }
 
     fn evaluate(&self, u: f64) -> f64 {
-        // Below 1e-6 (tan² above 1e12) the exponential has underflowed for every alpha up to 1.
+        // Below 1e-6 the exponential has underflowed for alpha up to 1, and u⁴ is about to for any.
         if u <= 1e-6 {
             return 0.0;
         }

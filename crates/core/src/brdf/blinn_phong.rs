@@ -55,7 +55,7 @@ impl Brdf for BlinnPhong {
 
     fn widen(&self, by: SlopeVariance) -> Box<dyn Brdf> {
         let s = self.exponent.get();
-        let widened = (s / (1.0 + s * by.get())).max(f64::MIN_POSITIVE);
+        let widened = (s / (1.0 + s * by.get())).max(1e-3);
         Box::new(Self { exponent: Exponent::new(widened).unwrap_or(self.exponent) })
     }
 

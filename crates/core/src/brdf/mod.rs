@@ -168,7 +168,7 @@ mod tests {
         assert_eq!(message("ggx:x"), "BRDF `ggx:x`: `x` is no number");
         assert_eq!(
             message("blinn-phong:NaN"),
-            "BRDF `blinn-phong:NaN`: exponent must be above 0 and at most 1e6, not NaN"
+            "BRDF `blinn-phong:NaN`: exponent must be between 0.001 and 1e6, not NaN"
         );
         assert_eq!(message("lambert:1"), "BRDF `lambert:1`: takes no number");
     }

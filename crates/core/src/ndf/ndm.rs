@@ -72,22 +72,29 @@ pub(super) const ROW: Row = Row {
 };
 
 fn parse(words: &[&str]) -> Result<Box<dyn Method>, String> {
-    let mut ndm = Ndm { kernel: Kernel::Brdf, normalisation: Normalisation::Partial };
+    let (mut kernel, mut normalisation) = (None, None);
     for word in words {
-        match *word {
-            "brdf" => ndm.kernel = Kernel::Brdf,
-            "gaussian" => ndm.kernel = Kernel::Gaussian,
-            "pearson" => ndm.kernel = Kernel::Pearson,
-            "partial" => ndm.normalisation = Normalisation::Partial,
-            "integrated" => ndm.normalisation = Normalisation::Integrated,
-            "plane" => ndm.normalisation = Normalisation::Plane,
+        let named_before = match *word {
+            "brdf" => kernel.replace(Kernel::Brdf).is_some(),
+            "gaussian" => kernel.replace(Kernel::Gaussian).is_some(),
+            "pearson" => kernel.replace(Kernel::Pearson).is_some(),
+            "partial" => normalisation.replace(Normalisation::Partial).is_some(),
+            "integrated" => normalisation.replace(Normalisation::Integrated).is_some(),
+            "plane" => normalisation.replace(Normalisation::Plane).is_some(),
             other => {
                 return Err(format!(
                     "`{other}` is no kernel (brdf, gaussian, pearson) and no normalisation (partial, integrated, plane)"
                 ));
             }
+        };
+        if named_before {
+            return Err(format!("`{word}` is a second word for the same choice"));
         }
     }
+    let ndm = Ndm {
+        kernel: kernel.unwrap_or(Kernel::Brdf),
+        normalisation: normalisation.unwrap_or(Normalisation::Partial),
+    };
     if ndm.kernel == Kernel::Brdf && ndm.normalisation == Normalisation::Integrated {
         return Err(
             "factors are integrated before the BRDF is known: name `gaussian` or `pearson`".to_owned()
@@ -216,6 +223,23 @@ impl SpaceGaussian {
     }
 }
 
+/// The covariance `L D Lᵀ` with the pivots of a symmetric matrix held at zero or above.
+///
+/// Rounding of the stored moments can make a matrix indefinite, and a sharp lobe's small gloss does not
+/// mend that. x and y come first: their moments are the well-conditioned ones, z is nearly a function of them.
+fn nearest_covariance(m: DMat3) -> DMat3 {
+    // A pivot that is nothing but rounding has no say in the rows below it.
+    let divide = |a: f64, pivot: f64| if pivot > 0.0 { a / pivot } else { 0.0 };
+    let d0 = m.x_axis.x.max(0.0);
+    let (l10, l20) = (divide(m.x_axis.y, d0), divide(m.x_axis.z, d0));
+    let d1 = (m.y_axis.y - l10 * l10 * d0).max(0.0);
+    let l21 = divide(m.y_axis.z - l20 * l10 * d0, d1);
+    let d2 = (m.z_axis.z - l20 * l20 * d0 - l21 * l21 * d1).max(0.0);
+    let (c0, c1) = (DVec3::new(1.0, l10, l20), DVec3::new(0.0, 1.0, l21));
+    let outer = |c: DVec3, d: f64| DMat3::from_cols(c * (c.x * d), c * (c.y * d), c * (c.z * d));
+    outer(c0, d0) + outer(c1, d1) + outer(DVec3::Z, d2)
+}
+
 impl Representation for Ndm {
     type Sums = PoleMoments;
     type Lobes = SpaceGaussian;
@@ -287,16 +311,10 @@ impl Representation for Ndm {
     fn decode(&self, sums: &PoleMoments) -> SpaceGaussian {
         let p = DVec3::from_array(sums.mean.map(f64::from));
         let [xx, yy, zz, xy, xz, yz] = sums.second.map(f64::from);
-        let var = DVec3::new(xx - p.x * p.x, yy - p.y * p.y, zz - p.z * p.z).max(DVec3::ZERO);
-        // Rounding may push a correlation beyond one; hold each to what its variances allow.
-        let hold = |c: f64, a: f64, b: f64| c.clamp(-(a * b).sqrt(), (a * b).sqrt());
-        let (xy, xz, yz) = (
-            hold(xy - p.x * p.y, var.x, var.y),
-            hold(xz - p.x * p.z, var.x, var.z),
-            hold(yz - p.y * p.z, var.y, var.z),
-        );
-        let covariance =
-            DMat3::from_cols(DVec3::new(var.x, xy, xz), DVec3::new(xy, var.y, yz), DVec3::new(xz, yz, var.z));
+        let (xx, yy, zz) = (xx - p.x * p.x, yy - p.y * p.y, zz - p.z * p.z);
+        let (xy, xz, yz) = (xy - p.x * p.y, xz - p.x * p.z, yz - p.y * p.z);
+        let columns = [DVec3::new(xx, xy, xz), DVec3::new(xy, yy, yz), DVec3::new(xz, yz, zz)];
+        let covariance = nearest_covariance(DMat3::from_cols(columns[0], columns[1], columns[2]));
         SpaceGaussian { mean: p + DVec3::Z, covariance, factors: sums.factors.map(f64::from) }
     }
 
