@@ -15,8 +15,17 @@ static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 #[derive(Debug)]
 pub struct AtomicFile {
     file: File,
-    temporary: TempPath,
+    /// Until the file has its final name.
+    temporary: Option<TempPath>,
     target: PathBuf,
+}
+
+impl Drop for AtomicFile {
+    fn drop(&mut self) {
+        if let Some(temporary) = self.temporary.take() {
+            forget(&temporary.to_path_buf());
+        }
+    }
 }
 
 impl AtomicFile {
@@ -32,6 +41,9 @@ impl AtomicFile {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
             _ => Path::new("."),
         };
+        if !folder.is_dir() {
+            return Err(MapError::invalid(target, format!("there is no folder {}", folder.display())));
+        }
         let mut builder = tempfile::Builder::new();
         // Readable as any new file is; the crate's default is for secrets.
         #[cfg(unix)]
@@ -39,7 +51,7 @@ impl AtomicFile {
         let made = builder.prefix(".ndfmap-").tempfile_in(folder).map_err(|e| MapError::io(target, e))?;
         let (file, temporary) = made.into_parts();
         unfinished().push(temporary.to_path_buf());
-        Ok(Self { file, temporary, target: target.to_owned() })
+        Ok(Self { file, temporary: Some(temporary), target: target.to_owned() })
     }
 
     /// The file to write to.
@@ -57,14 +69,17 @@ impl AtomicFile {
     ///
     /// # Errors
     /// [`MapError`] when the rename fails; the temporary file is removed.
-    pub fn finish(self) -> Result<(), MapError> {
-        let Self { file, temporary, target } = self;
-        drop(file);
+    pub fn finish(mut self) -> Result<(), MapError> {
+        let Some(temporary) = self.temporary.take() else { return Ok(()) };
         let name = temporary.to_path_buf();
-        let renamed = temporary.persist(&target).map_err(|e| MapError::io(&target, e.error));
-        unfinished().retain(|unfinished| *unfinished != name);
+        let renamed = temporary.persist(&self.target).map_err(|e| MapError::io(&self.target, e.error));
+        forget(&name);
         renamed
     }
+}
+
+fn forget(name: &Path) {
+    unfinished().retain(|unfinished| unfinished != name);
 }
 
 /// Writes a whole file at once.

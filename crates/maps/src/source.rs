@@ -86,6 +86,9 @@ pub struct SourceMap {
 /// What built-in surfaces are called: this and a name.
 pub const BUILTIN_PREFIX: &str = "builtin:";
 
+/// Heights beyond this many texture widths are no heights: NaN, infinity, or a "no data" that no tag names.
+const ABSURD_HEIGHT: f32 = 1e6;
+
 /// Heights that span more texture widths than this are surely in other units.
 const STEEP_SPAN: f32 = 2.0;
 
@@ -129,7 +132,13 @@ fn builtin(map: &Path, name: &str, options: &SourceOptions) -> Result<SourceMap,
         height_scale,
         convention,
     };
-    Ok(SourceMap { surface, source, warnings: Vec::new() })
+    let own = SourceOptions { builtin_size: options.builtin_size, ..SourceOptions::default() };
+    let warnings = if *options == own {
+        Vec::new()
+    } else {
+        vec!["is built in: only its size can be chosen, other source options do nothing".to_owned()]
+    };
+    Ok(SourceMap { surface, source, warnings })
 }
 
 /// Takes a decoded picture as a surface.
@@ -157,6 +166,9 @@ pub fn source_of_image(
             (Box::new(field), Some(options.height_scale), None)
         }
         SourceKind::Normal => {
+            if options.height_scale != DEFAULT_HEIGHT_SCALE || options.invert {
+                warnings.push("is taken as normals: `--height-scale` and `--invert` do nothing".to_owned());
+            }
             let normals = EncodedNormals::new(path, image, options, &mut warnings)?;
             (Box::new(normals), None, Some(options.convention.name().to_owned()))
         }
@@ -186,7 +198,7 @@ fn height_field(
     let height = |x: usize, y: usize| {
         let h = image.samples.get((y * image.size.width + x) * image.channels);
         let h = if options.invert { one - h } else { h } * scale;
-        if h.is_finite() {
+        if h.abs() < ABSURD_HEIGHT {
             h
         } else {
             bad += 1;
@@ -195,7 +207,10 @@ fn height_field(
     };
     let heights = Grid::from_fn(image.size, height);
     if bad == image.size.area() {
-        return Err(MapError::invalid(path, "holds no finite height"));
+        return Err(MapError::invalid(
+            path,
+            "holds no height: all are NaN, infinite or beyond a million texture widths",
+        ));
     }
     let (low, high) = heights.texels().iter().fold((f32::MAX, f32::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
     if high - low > STEEP_SPAN {
@@ -205,7 +220,9 @@ fn height_field(
         ));
     }
     if bad > 0 {
-        warnings.push(format!("{bad} texels are NaN or infinite and take height 0"));
+        warnings.push(format!(
+            "{bad} texels are NaN, infinite or beyond a million texture widths and take height 0"
+        ));
     }
     Ok(HeightField { heights, wraps: options.wraps, filter: options.slope_filter })
 }

@@ -92,7 +92,7 @@ fn grey_is_height_nan_is_counted_and_depth_inverts() {
     let options = SourceOptions { height_scale: 0.01, invert: true, ..Default::default() };
     let map = source("h.tif", &bytes, &options);
     assert_eq!(map.source.kind, SourceKind::Height);
-    assert!(map.warnings[0].starts_with("2 texels are NaN or infinite"), "{:?}", map.warnings);
+    assert!(map.warnings[0].starts_with("2 texels are NaN, infinite"), "{:?}", map.warnings);
     let mut row = SurfaceRow::flat(WIDTH);
     map.surface.read_row(0, &mut row);
     assert_eq!(row.height[3], -0.03);
@@ -100,7 +100,10 @@ fn grey_is_height_nan_is_counted_and_depth_inverts() {
     let all_bad = common::tiff::<Gray32Float>(&vec![f32::NAN; WIDTH * HEIGHT]);
     let image = read_image("h.tif".as_ref(), &all_bad).unwrap();
     let error = source_of_image("h.tif".as_ref(), image, String::new(), &options).err().unwrap();
-    assert_eq!(error.to_string(), "h.tif: holds no finite height");
+    assert_eq!(
+        error.to_string(),
+        "h.tif: holds no height: all are NaN, infinite or beyond a million texture widths"
+    );
 }
 
 #[test]

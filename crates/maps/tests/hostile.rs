@@ -140,9 +140,22 @@ fn huge_headers_are_refused_before_memory_is_taken() {
     jpeg[frame + 5..frame + 9].fill(0xFF);
     refuse("bomb.jpg", &jpeg, "65535 × 65535");
 
+    jpeg[frame + 5..frame + 9].copy_from_slice(&[0x40, 0, 0x40, 0]);
+    refuse("bomb.jpg", &jpeg, "cannot hold 16384 × 16384 texels");
+
+    // The data window's and display window's corners, in the first header.
+    let mut exr = sample("map.exr");
+    for name in [b"dataWindow\0box2i\0".as_slice(), b"displayWindow\0box2i\0"] {
+        let at = exr.windows(name.len()).position(|w| w == name).unwrap() + name.len() + 4;
+        exr[at + 8..at + 16].copy_from_slice(&[0xFF, 0x3F, 0, 0, 0xFF, 0x3F, 0, 0]);
+    }
+    refuse("bomb.exr", &exr, "cannot hold the 805306368 samples it claims");
+
     let mut tga = sample("map.tga");
     tga[12..16].fill(0xFF);
     refuse("bomb.tga", &tga, "claims 65535 × 65535 texels");
+    tga[12..16].copy_from_slice(&[0, 0x40, 0, 0x40]);
+    refuse("bomb.tga", &tga, "cannot hold 16384 × 16384 texels");
     tga[12..16].fill(0);
     refuse("zero.tga", &tga, "at least one texel");
 

@@ -197,7 +197,7 @@ fn failures_are_1_and_leave_nothing() {
         (vec!["bake", "builtin:nothing", "-o", &path("x.ktx2")], "there is no built-in surface `nothing`"),
         (vec!["bake", &path("none.png"), "-o", &path("x.ktx2")], "none.png"),
         (vec!["bake", &text(folder.path()), "-o", &path("x.ktx2")], "is a folder, not a file"),
-        (vec!["bake", &good, "-o", &path("x.ktx2")], "KTX2 files are not read as pictures"),
+        (vec!["bake", &good, "-o", &path("x.ktx2")], "is already a baked map"),
         (vec!["bake", "builtin:foil", "-o", &path("folder.ktx2")], "is a folder, not a file"),
         (vec!["bake", "builtin:foil", "-o", &path("no/such/x.ktx2")], "x.ktx2"),
         (vec!["bake", "builtin:foil", "-o", "/dev/null/x.exr"], "x.exr"),

@@ -5,12 +5,12 @@
 //! `maketx --bumpslopes` writes them: slopes of a height map per texel in the file's own units with t
 //! down the image, slopes of a normal map as `-n.xy / n.z` of the vectors as stored, and `b0_h` = -1.
 
-use std::io::{Cursor, Seek, Write};
+use std::io::{Cursor, Write};
 use std::path::Path;
 
 use ::exr::math::RoundingMode;
-use ::exr::meta::MetaData;
 use ::exr::meta::attribute::{AttributeValue, Text};
+use ::exr::meta::{BlockDescription, MetaData};
 use ::exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image as ExrImage, ImageAttributes,
     IntegerBounds, Layer, LayerAttributes, Levels, LineOrder, ReadChannels, ReadLayers, Vec2, WritableImage,
@@ -46,48 +46,69 @@ type AnyLayer = Layer<AnyChannels<Levels<FlatSamples>>>;
 
 /// Checks every part of the header, before any texel is read.
 fn check_header(path: &Path, bytes: &[u8]) -> Result<(), MapError> {
-    let meta =
-        MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| MapError::invalid(path, e))?;
-    if meta.headers.is_empty() {
-        return Err(MapError::invalid(path, "is an OpenEXR file without any part"));
-    }
+    let meta = metadata(path, bytes)?;
     let mut total = 0;
     for header in &meta.headers {
         let size = check_size(path, header.layer_size.width(), header.layer_size.height())?;
         total += size.area() * header.channels.list.len();
-        // Zip and RLE expand by at most some 1000; B44, PXR24, PIZ and DWA by far less on any real data,
-        // but a constant picture in PIZ can reach more, hence the generous bound.
-        if size.area() / 65_536 > bytes.len() {
-            return Err(MapError::invalid(
-                path,
-                format!(
-                    "is truncated: {} bytes cannot hold {} × {} texels",
-                    bytes.len(),
-                    size.width,
-                    size.height
-                ),
-            ));
+        if let BlockDescription::Tiles(tiles) = &header.blocks
+            && tiles.tile_size.width().saturating_mul(tiles.tile_size.height()) > 1 << 20
+        {
+            return Err(MapError::unsupported(path, "has tiles of more than 2²⁰ texels"));
         }
     }
-    if total > 8 * MAX_TEXELS {
-        return Err(MapError::unsupported(
-            path,
-            format!("claims {total} samples; at most {} are read", 8 * MAX_TEXELS),
-        ));
+    // Zip's best is 1032 to 1, of at least two bytes a sample; the other codecs stay below on any map.
+    if total > 8 * MAX_TEXELS || total / 516 > bytes.len() {
+        let reason = format!("is truncated: {} bytes cannot hold the {total} samples it claims", bytes.len());
+        return Err(MapError::invalid(path, reason));
     }
     Ok(())
 }
 
+/// Runs the crate's decoder, some of whose own checks of a hostile file are assertions.
+fn guarded<T>(path: &Path, decode: impl FnOnce() -> ::exr::error::Result<T>) -> Result<T, MapError> {
+    match std::panic::catch_unwind(std::panic::AssertUnwindSafe(decode)) {
+        Ok(result) => result.map_err(|e| MapError::invalid(path, e)),
+        Err(_) => Err(MapError::invalid(path, "is damaged in a way that the OpenEXR decoder cannot handle")),
+    }
+}
+
+/// The headers of all parts, of which there is at least one.
+fn metadata(path: &Path, bytes: &[u8]) -> Result<MetaData, MapError> {
+    let meta = guarded(path, || MetaData::read_from_buffered(Cursor::new(bytes), false))?;
+    if meta.headers.is_empty() {
+        return Err(MapError::invalid(path, "is an OpenEXR file without any part"));
+    }
+    Ok(meta)
+}
+
+/// The text of our header, if the file has one.
+fn header_text(meta: &MetaData) -> Option<String> {
+    let first = &meta.headers[0];
+    [&first.shared_attributes.other, &first.own_attributes.other].into_iter().find_map(|other| {
+        match other.get(&Text::from(KEY)) {
+            Some(AttributeValue::Text(text)) => Some(text.to_string()),
+            _ => None,
+        }
+    })
+}
+
+/// True when the first part has OpenImageIO's six channels.
+fn has_bumpslopes(meta: &MetaData) -> bool {
+    let channels = &meta.headers[0].channels.list;
+    BUMPSLOPES.iter().all(|name| channels.iter().any(|c| c.name.eq_case_insensitive(name)))
+}
+
 fn read_image(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
     check_header(path, bytes)?;
-    let image = read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .first_valid_layer()
-        .all_attributes()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(|e| MapError::invalid(path, e))?;
+    let meta = metadata(path, bytes)?;
+    if header_text(&meta).is_some() || has_bumpslopes(&meta) {
+        return Err(MapError::unsupported(path, "is already a baked map; `inspect` reads it"));
+    }
+    let image = guarded(path, || {
+        let reader = read().no_deep_data().largest_resolution_level().all_channels();
+        reader.first_valid_layer().all_attributes().from_buffered(Cursor::new(bytes))
+    })?;
     let layer = image.layer_data;
     let size = check_size(path, layer.size.width(), layer.size.height())?;
     let named = |names: &[&str]| -> Option<Vec<&AnyChannel<FlatSamples>>> {
@@ -114,30 +135,17 @@ fn read_image(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
 
 fn read_ndf(path: &Path, bytes: &[u8]) -> Result<Option<NdfMap>, MapError> {
     check_header(path, bytes)?;
-    let invalid = |e: ::exr::error::Error| MapError::invalid(path, e);
-    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(invalid)?;
+    let meta = metadata(path, bytes)?;
+    let (text, bumpslopes) = (header_text(&meta), has_bumpslopes(&meta));
     let first = &meta.headers[0];
-    let text =
-        [&first.shared_attributes.other, &first.own_attributes.other].into_iter().find_map(
-            |other| match other.get(&Text::from(KEY)) {
-                Some(AttributeValue::Text(text)) => Some(text.to_string()),
-                _ => None,
-            },
-        );
-    let bumpslopes =
-        BUMPSLOPES.iter().all(|name| first.channels.list.iter().any(|c| c.name.eq_case_insensitive(name)));
     if text.is_none() && !bumpslopes {
         return Ok(None);
     }
     let header = text.map(|t| Header::from_json(path, &t)).transpose()?;
-    let image = read()
-        .no_deep_data()
-        .all_resolution_levels()
-        .all_channels()
-        .all_layers()
-        .all_attributes()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(invalid)?;
+    let image = guarded(path, || {
+        let reader = read().no_deep_data().all_resolution_levels().all_channels();
+        reader.all_layers().all_attributes().from_buffered(Cursor::new(bytes))
+    })?;
     let layers: Vec<AnyLayer> = image.layer_data.into_iter().collect();
     if bumpslopes {
         let wraps = spell_oiio_wraps(
@@ -411,14 +419,11 @@ fn write_layers(
         .collect();
     let image = ExrImage { attributes, layer_data: layers };
     let mut file = AtomicFile::create(path)?;
-    let written = {
-        let mut buffered = std::io::BufWriter::new(file.file());
-        let result = image.write().to_buffered(&mut buffered);
-        result.map_err(|e| MapError::invalid(path, e)).and_then(|()| {
-            buffered.flush().and_then(|()| buffered.stream_position()).map_err(|e| MapError::io(path, e))
-        })
-    }?;
-    let length = file.file().metadata().map_or(written, |m| m.len());
+    let mut buffered = std::io::BufWriter::new(file.file());
+    image.write().to_buffered(&mut buffered).map_err(|e| MapError::invalid(path, e))?;
+    buffered.flush().map_err(|e| MapError::io(path, e))?;
+    drop(buffered);
+    let length = file.file().metadata().map_err(|e| MapError::io(path, e))?.len();
     file.finish()?;
     Ok(length)
 }

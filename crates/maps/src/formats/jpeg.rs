@@ -5,7 +5,10 @@ use std::path::Path;
 
 use ::image::codecs::jpeg::JpegDecoder;
 
-use super::{Format, decoded::read_integers};
+use super::{
+    Format,
+    decoded::{Capacity, read_integers},
+};
 use crate::{Image, MapError};
 
 pub(super) const FORMAT: Format = Format {
@@ -24,5 +27,7 @@ fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
         return Err(MapError::invalid(path, "is truncated: it does not end in a JPEG end-of-image marker"));
     }
     let decoder = JpegDecoder::new(Cursor::new(bytes)).map_err(|e| MapError::invalid(path, e))?;
-    read_integers(path, decoder)
+    // A sequential block of 64 texels takes at least two bits a component; progressive files of one colour
+    // pack runs of blocks, and 4096 leaves room for those.
+    read_integers(path, decoder, &Capacity { bytes: bytes.len(), texels_per_byte: 4096 })
 }

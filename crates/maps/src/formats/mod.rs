@@ -92,7 +92,7 @@ pub fn read_ndf(path: &Path, bytes: &[u8]) -> Result<Option<NdfMap>, MapError> {
 pub fn read_image(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
     let format = detect(path, bytes)?;
     let read = format.read_image.ok_or_else(|| {
-        MapError::unsupported(path, format!("{} files are not read as pictures", format.name))
+        MapError::unsupported(path, "is already a baked map, or no map: `inspect` reads it")
     })?;
     read(path, bytes)
 }

@@ -5,7 +5,10 @@ use std::path::Path;
 
 use ::image::codecs::tga::TgaDecoder;
 
-use super::{Format, decoded::read_integers};
+use super::{
+    Format,
+    decoded::{Capacity, read_integers},
+};
 use crate::image::check_size;
 use crate::{Image, MapError};
 
@@ -19,5 +22,6 @@ fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
     let side = |at: usize| usize::from(u16::from_le_bytes([header[at], header[at + 1]]));
     check_size(path, side(12), side(14))?;
     let decoder = TgaDecoder::new(Cursor::new(bytes)).map_err(|e| MapError::invalid(path, e))?;
-    read_integers(path, decoder)
+    // A run-length packet is a byte and a texel, for up to 128 texels.
+    read_integers(path, decoder, &Capacity { bytes: bytes.len(), texels_per_byte: 128 })
 }

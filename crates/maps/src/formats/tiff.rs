@@ -29,7 +29,7 @@ const NO_DATA: Tag = Tag::Unknown(42113);
 fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
     let invalid = |e: ::tiff::TiffError| MapError::invalid(path, e);
     let mut limits = Limits::default();
-    limits.decoding_buffer_size = MAX_TEXELS * 4;
+    limits.decoding_buffer_size = MAX_TEXELS * 16;
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(invalid)?.with_limits(limits);
     let (width, height) = decoder.dimensions().map_err(invalid)?;
     let size = check_size(path, width as usize, height as usize)?;
@@ -71,14 +71,22 @@ fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
         }
     };
     let mut image = Image::new(path, size, channels, samples)?;
-    if let (Some(hole), Samples::F32(values)) = (no_data, &mut image.samples) {
-        let lowest =
-            values.iter().copied().filter(|v| *v != hole && v.is_finite()).fold(f32::INFINITY, f32::min);
-        let holes = values.iter().filter(|v| **v == hole).count();
-        if holes > 0 && lowest.is_finite() {
-            values.iter_mut().filter(|v| **v == hole).for_each(|v| *v = lowest);
-            image.warnings.push(format!("{holes} texels without data take the lowest height, {lowest}"));
+    if let Some(hole) = no_data {
+        let filled = match &mut image.samples {
+            Samples::U8(v) => fill(v, |s| f32::from(*s) == hole),
+            Samples::U16(v) => fill(v, |s| f32::from(*s) == hole),
+            Samples::F32(v) => fill(v, |s| *s == hole || s.is_nan() && hole.is_nan()),
+        };
+        if filled > 0 {
+            image.warnings.push(format!("{filled} texels without data take the lowest value there is"));
         }
     }
     Ok(image)
+}
+
+/// Gives holes the lowest value that is none; returns how many there were.
+fn fill<T: Copy + PartialOrd>(values: &mut [T], is_hole: impl Fn(&T) -> bool) -> usize {
+    let lower = |a: T, b: T| if b < a { b } else { a };
+    let Some(lowest) = values.iter().copied().filter(|v| !is_hole(v)).reduce(lower) else { return 0 };
+    values.iter_mut().filter(|v| is_hole(v)).map(|v| *v = lowest).count()
 }

@@ -148,12 +148,13 @@ pub(super) fn brdf_spelling(text: &str) -> Result<String, String> {
 }
 
 fn unknown(name: &str, known: impl Iterator<Item = &'static str> + Clone) -> String {
-    let nearest =
-        known.clone().max_by(|a, b| strsim::jaro_winkler(name, a).total_cmp(&strsim::jaro_winkler(name, b)));
+    // Below 0.7 the nearest is merely the least far.
+    let near = known.clone().filter(|k| strsim::jaro_winkler(name, k) > 0.7);
+    let nearest = near.max_by(|a, b| strsim::jaro_winkler(name, a).total_cmp(&strsim::jaro_winkler(name, b)));
     let all = known.collect::<Vec<_>>().join(", ");
     match nearest {
         Some(nearest) => format!("there is no `{name}`; did you mean `{nearest}`? There are {all}"),
-        None => format!("there is no `{name}`"),
+        None => format!("there is no `{name}`; there are {all}"),
     }
 }
 
