@@ -23,7 +23,7 @@ pub struct AtomicFile {
 impl Drop for AtomicFile {
     fn drop(&mut self) {
         if let Some(temporary) = self.temporary.take() {
-            forget(&temporary.to_path_buf());
+            forget(&temporary);
         }
     }
 }
