@@ -172,8 +172,9 @@ impl SpaceGaussian {
         (mu, a, b)
     }
 
+    /// The covariance with the base gloss `v` added.
     fn widened(&self, v: f64) -> DMat3 {
-        self.covariance + DMat3::from_diagonal(DVec3::splat(v))
+        with_pivots_above(self.covariance + DMat3::from_diagonal(DVec3::splat(v)), v)
     }
 
     /// `∫ g(d) / sqrt|Σ|` over the sphere, divided by the same for a flat map of gloss `v`.
@@ -223,18 +224,17 @@ impl SpaceGaussian {
     }
 }
 
-/// The covariance `L D Lᵀ` with the pivots of a symmetric matrix held at zero or above.
+/// The matrix `L D Lᵀ` of a symmetric one, with the pivots held at `floor` or above.
 ///
-/// Rounding of the stored moments can make a matrix indefinite, and a sharp lobe's small gloss does not
-/// mend that. x and y come first: their moments are the well-conditioned ones, z is nearly a function of them.
-fn nearest_covariance(m: DMat3) -> DMat3 {
-    // A pivot that is nothing but rounding has no say in the rows below it.
-    let divide = |a: f64, pivot: f64| if pivot > 0.0 { a / pivot } else { 0.0 };
-    let d0 = m.x_axis.x.max(0.0);
-    let (l10, l20) = (divide(m.x_axis.y, d0), divide(m.x_axis.z, d0));
-    let d1 = (m.y_axis.y - l10 * l10 * d0).max(0.0);
-    let l21 = divide(m.y_axis.z - l20 * l10 * d0, d1);
-    let d2 = (m.z_axis.z - l20 * l20 * d0 - l21 * l21 * d1).max(0.0);
+/// A covariance plus `floor` times the identity has no pivot below `floor`. Rounding of the stored moments can
+/// make the covariance indefinite, which a sharp lobe's small gloss does not mend; this does, and leaves
+/// every sound matrix as it is. x and y come first: their moments are the well-conditioned ones.
+fn with_pivots_above(m: DMat3, floor: f64) -> DMat3 {
+    let d0 = m.x_axis.x.max(floor);
+    let (l10, l20) = (m.x_axis.y / d0, m.x_axis.z / d0);
+    let d1 = (m.y_axis.y - l10 * l10 * d0).max(floor);
+    let l21 = (m.y_axis.z - l20 * l10 * d0) / d1;
+    let d2 = (m.z_axis.z - l20 * l20 * d0 - l21 * l21 * d1).max(floor);
     let (c0, c1) = (DVec3::new(1.0, l10, l20), DVec3::new(0.0, 1.0, l21));
     let outer = |c: DVec3, d: f64| DMat3::from_cols(c * (c.x * d), c * (c.y * d), c * (c.z * d));
     outer(c0, d0) + outer(c1, d1) + outer(DVec3::Z, d2)
@@ -311,10 +311,10 @@ impl Representation for Ndm {
     fn decode(&self, sums: &PoleMoments) -> SpaceGaussian {
         let p = DVec3::from_array(sums.mean.map(f64::from));
         let [xx, yy, zz, xy, xz, yz] = sums.second.map(f64::from);
-        let (xx, yy, zz) = (xx - p.x * p.x, yy - p.y * p.y, zz - p.z * p.z);
+        let (xx, yy, zz) = ((xx - p.x * p.x).max(0.0), (yy - p.y * p.y).max(0.0), (zz - p.z * p.z).max(0.0));
         let (xy, xz, yz) = (xy - p.x * p.y, xz - p.x * p.z, yz - p.y * p.z);
         let columns = [DVec3::new(xx, xy, xz), DVec3::new(xy, yy, yz), DVec3::new(xz, yz, zz)];
-        let covariance = nearest_covariance(DMat3::from_cols(columns[0], columns[1], columns[2]));
+        let covariance = DMat3::from_cols(columns[0], columns[1], columns[2]);
         SpaceGaussian { mean: p + DVec3::Z, covariance, factors: sums.factors.map(f64::from) }
     }
 
@@ -337,9 +337,9 @@ impl Representation for Ndm {
     fn finish(&self, channels: &mut [f32]) {
         let mut sums = self.unpack(channels);
         let gaussian = self.decode(&sums);
-        if gaussian.covariance.determinant() > 0.0
-            || gaussian.mean.distance(direction_or_up(gaussian.mean)) > 1e-6
-        {
+        // Less spread than this changes no factor by more than 1e-5, at any gloss that has one.
+        let spread: f64 = (0..3).map(|i| gaussian.covariance.col(i)[i]).sum();
+        if spread > 1e-9 || gaussian.mean.distance(direction_or_up(gaussian.mean)) > 1e-6 {
             for (factor, v) in sums.factors.iter_mut().zip(FACTOR_VARIANCES) {
                 *factor = (1.0 / gaussian.relative_integral(self.kernel, v)) as f32;
             }
