@@ -4,9 +4,10 @@
 //! the coarsest finer level whose texels nest in its own, which for powers of two is the one before, and
 //! from the surface itself where none nests. A band carries its rows through as many nesting levels as it
 //! can while they are in cache, so the finest levels are never held in floats. Bands are fixed by the map,
-//! not by the number of threads, so the bytes are too.
+//! not by the number of threads, so the bytes are too. Methods that are fitted go another way (`fitted.rs`).
 
 mod average;
+mod fitted;
 mod plan;
 
 use std::sync::{Mutex, PoisonError};
@@ -16,7 +17,8 @@ use rayon::prelude::*;
 use self::average::{RowAverager, Sums, copy_row, halve};
 use self::plan::{BAND, Band, Plan, split_layers};
 
-use crate::grid::Size;
+use crate::fit::Four;
+use crate::grid::{Grid, Size};
 use crate::ndf::Method;
 use crate::pyramid::{Layout, LevelMismatch, Precision, Pyramid, footprint, level_sizes};
 use crate::surface::{Surface, SurfaceRow};
@@ -75,9 +77,15 @@ impl Bake<'_> {
     /// Size, layers and precision of what will come out.
     #[must_use]
     pub fn layout(&self) -> Layout {
+        self.layout_with(0)
+    }
+
+    /// The same for a map whose lobes carry this many attributes.
+    #[must_use]
+    pub fn layout_with(&self, attributes: usize) -> Layout {
         Layout {
             size: self.surface.size(),
-            layers: self.method.layers(),
+            layers: self.method.layers() * (1 + attributes),
             precision: self.precision,
             wraps: self.surface.wraps(),
         }
@@ -96,6 +104,30 @@ impl Bake<'_> {
     /// # Errors
     /// The first error of the sink.
     pub fn run<S: LevelSink>(&self, sink: &mut S) -> Result<BakeReport, S::Error> {
+        self.run_with(&[], sink)
+    }
+
+    /// Bakes into `sink` with attributes, other maps of the surface's size: each lobe carries its weight times
+    /// the mean of their values over its normals, in further layers, `method.layers()` an attribute.
+    ///
+    /// # Errors
+    /// The first error of the sink.
+    ///
+    /// # Panics
+    /// When the method is not fitted and there are attributes, or an attribute has another size.
+    pub fn run_with<S: LevelSink>(
+        &self,
+        attributes: &[Grid<Four>],
+        sink: &mut S,
+    ) -> Result<BakeReport, S::Error> {
+        if let Some(fit) = self.method.fit() {
+            return self.run_fitted(&fit, attributes, sink);
+        }
+        assert!(attributes.is_empty(), "only the lobes of fitted methods carry attributes");
+        self.run_linear(sink)
+    }
+
+    fn run_linear<S: LevelSink>(&self, sink: &mut S) -> Result<BakeReport, S::Error> {
         let plan = Plan::new(self.layout());
         let mut report = BakeReport::default();
         let mut sums: Vec<Option<Sums>> = vec![None; plan.sizes.len()];

@@ -5,6 +5,7 @@ use glam::{DVec3, Vec2, Vec3};
 use super::{FlatLobe, Method, TABLE, parse};
 use crate::bake::Bake;
 use crate::brdf::{self, Brdf};
+use crate::fit::Alignment;
 use crate::grid::{Grid, Size};
 use crate::procedural;
 use crate::pyramid::Precision;
@@ -22,6 +23,14 @@ fn of_normals(size: (usize, usize), normal: impl FnMut(usize, usize) -> Vec3) ->
 
 fn bake(method: &dyn Method, surface: &dyn Surface, precision: Precision) -> crate::pyramid::Pyramid {
     Bake { surface, method, precision, progress: &|_| () }.to_pyramid().0
+}
+
+/// What must be the same however normals are shared out among lobes: the channels, summed over fitted lobes.
+fn totals(method: &dyn Method, channels: &[f32]) -> Vec<f32> {
+    if method.fit().is_none() {
+        return channels.to_vec();
+    }
+    (0..4).map(|c| channels.iter().skip(c).step_by(4).sum()).collect()
 }
 
 #[test]
@@ -47,6 +56,13 @@ fn bad_spellings_say_why() {
     assert!(message("ndm:round").starts_with("method `ndm:round`: `round` is no kernel"));
     assert!(message("ndm:brdf:integrated").contains("before the BRDF is known"));
     assert!(message("ndm:gaussian:pearson").contains("second word"));
+    assert!(message("vmf").contains("whole number from 1 to 8, as in `vmf:4`"));
+    assert!(message("gmm:9").contains("whole number from 1 to 8, as in `gmm:4`"));
+    assert!(
+        message("vmf:4:algined")
+            .contains("no alignment; there are refined, parent, prior, matched, unaligned")
+    );
+    assert!(message("gmm:4:parent:origin").contains("no more"));
 }
 
 #[test]
@@ -140,7 +156,8 @@ fn a_constant_map_is_the_same_at_every_level() {
         let pyramid = bake(&*method, &tilted, Precision::Single);
         let fine = pyramid.texel(0, 0, 0);
         let last = pyramid.sizes().len() - 1;
-        for (a, b) in fine.iter().zip(pyramid.texel(last, 0, 0)) {
+        let (fine, coarse) = (totals(&*method, &fine), totals(&*method, &pyramid.texel(last, 0, 0)));
+        for (a, b) in fine.iter().zip(coarse) {
             // Averages of equal numbers: rounding of single floats only. The integrated factors are
             // computed from moments whose covariance is nothing but that rounding.
             let tolerance = if method.spelling().ends_with("integrated") { 1e-3 } else { 2e-6 };
@@ -162,11 +179,15 @@ fn levels_are_area_weighted_means_of_the_finest() {
             surface.read_row(y, &mut row);
             let mut values = vec![0.0; 21 * 4 * method.layers()];
             method.accumulate_row(&row, &mut values);
+            if method.fit().is_some() {
+                // All in the first lobe's layer, which is also their sum.
+                values.truncate(21 * 4);
+            }
             fine.push(values);
         }
         for (level, coarse) in pyramid.sizes().iter().enumerate() {
             for (x, y) in [(0, 0), (coarse.width - 1, coarse.height - 1), (coarse.width / 2, 0)] {
-                let got = pyramid.texel(level, x, y);
+                let got = totals(&**method, &pyramid.texel(level, x, y));
                 for (c, got) in got.iter().enumerate() {
                     let mut expected = 0.0;
                     let overlap = |fine: usize, coarse: usize, i: usize, j: usize| {
@@ -182,10 +203,16 @@ fn levels_are_area_weighted_means_of_the_finest() {
                             expected += weight * f64::from(values[((c / 4) * 21 + i) * 4 + c % 4]);
                         }
                     }
-                    // Sums of up to 273 single floats.
+                    // Sums of up to 273 single floats. Lobes too light to store give their 1/8192 to the others. The prior
+                    // and refinement move means on purpose; how far they may is what a picture would hardly show.
+                    let tolerance = match method.fit().map(|f| f.alignment) {
+                        None => 1e-5,
+                        Some(Alignment::Refined | Alignment::Prior) => 0.1,
+                        Some(_) => 5e-4,
+                    };
                     let error = (f64::from(*got) - expected).abs();
                     assert!(
-                        error < 1e-5 * expected.abs().max(1.0),
+                        error < tolerance * expected.abs().max(1.0),
                         "{} {level} {x} {y} {c}",
                         method.spelling()
                     );
@@ -311,9 +338,10 @@ fn effective_lobes_keep_their_energy() {
         let mut out = vec![0.0; directions.len()];
         method.evaluator(&*brdf, &directions).evaluate(&pyramid.texel(3, 0, 0), &mut out);
         let total: f64 = out.iter().zip(&weights).map(|(f, w)| f * w).sum();
-        // Slopes place a lobe by shifting it, which only near the vertical is a rotation, and factors are
+        // Slopes and the plane place a lobe by shifting it, which only near the vertical is a rotation, and factors are
         // interpolated: a few percent. Else the quadrature and, for sh:16, ringing of rho_17 = 0.7 %.
-        let tolerance = if name == "slopes" || name.ends_with("integrated") { 0.05 } else { 0.01 };
+        let planar = name == "slopes" || name.starts_with("gmm");
+        let tolerance = if planar || name.ends_with("integrated") { 0.05 } else { 0.01 };
         assert!((total - 1.0).abs() < tolerance, "{name} {total}");
     }
 }

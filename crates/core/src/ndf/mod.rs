@@ -8,27 +8,34 @@
 //! Notation: `docs/notation.md`.
 
 mod fixed;
+mod gmm;
+mod mixture;
 mod naive;
 mod ndm;
 mod sh;
 mod slopes;
 mod toksvig;
+mod vmf;
 
 #[cfg(test)]
 mod conformance;
 
 pub use fixed::Fixed;
+pub use gmm::{GaussianMixture, Gmm};
+pub use mixture::{Lobes, Shaded};
 pub use naive::Naive;
 pub use ndm::{Kernel, Ndm, Normalisation};
 pub use sh::{Coefficients, Sh};
 pub use slopes::{SlopeGaussian, SlopeMoments, Slopes};
 pub use toksvig::{Lobe, Toksvig};
+pub use vmf::{Vmf, VmfMixture};
 
 use std::fmt::Debug;
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
 use crate::brdf::Brdf;
+use crate::fit::{Fit, Four};
 use crate::surface::SurfaceRow;
 
 /// One fine texel, as a representation sees it.
@@ -81,6 +88,16 @@ pub trait Representation: Debug + Send + Sync {
 
     /// Sets channels that are computed from the filtered sums and are no sums themselves.
     fn finish(&self, _channels: &mut [f32]) {}
+
+    /// What is to be fitted, where sums do not come straight from the fine normals.
+    fn fit(&self) -> Option<Fit> {
+        None
+    }
+
+    /// A fitted lobe's sums as this method's channels.
+    fn store_lobe(&self, sums: &Four) -> Four {
+        *sums
+    }
 
     /// True when [`Self::finish`] does something.
     fn has_finish(&self) -> bool {
@@ -150,6 +167,36 @@ pub enum Decoded {
     },
     /// Real spherical-harmonic coefficients: l, then m from -l to l.
     Coefficients(Vec<f64>),
+    /// Lobes on the sphere that are alive.
+    Lobes(Vec<MixtureLobe>),
+    /// Lobes in the plane of `n.xy` that are alive.
+    PlanarLobes(Vec<PlanarLobe>),
+}
+
+/// A lobe on the sphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MixtureLobe {
+    /// The layer it is stored in.
+    pub layer: usize,
+    /// Share of the texel.
+    pub weight: f64,
+    /// Unit mean direction.
+    pub mean: DVec3,
+    /// `1/kappa`; 0 where the stored form can tell no spread.
+    pub variance: f64,
+}
+
+/// A lobe in the plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlanarLobe {
+    /// The layer it is stored in.
+    pub layer: usize,
+    /// Share of the texel.
+    pub weight: f64,
+    /// Mean of `n.xy`.
+    pub mean: DVec2,
+    /// `sigma²`, on one axis.
+    pub variance: f64,
 }
 
 /// Effective lobes of one texel after another, for one BRDF at fixed directions.
@@ -199,6 +246,12 @@ pub trait Method: Debug + Send + Sync {
 
     /// What it makes of a flat map.
     fn flat_lobe(&self, brdf: &dyn Brdf) -> FlatLobe;
+
+    /// What is to be fitted; `None` for a method whose sums come straight from the fine normals.
+    fn fit(&self) -> Option<Fit>;
+
+    /// A fitted lobe's sums as this method's channels.
+    fn store_lobe(&self, sums: &Four) -> Four;
 }
 
 impl<R: Representation> Method for R {
@@ -247,6 +300,14 @@ impl<R: Representation> Method for R {
     fn flat_lobe(&self, brdf: &dyn Brdf) -> FlatLobe {
         Representation::flat_lobe(self, brdf)
     }
+
+    fn fit(&self) -> Option<Fit> {
+        Representation::fit(self)
+    }
+
+    fn store_lobe(&self, sums: &Four) -> Four {
+        Representation::store_lobe(self, sums)
+    }
 }
 
 /// Reads what follows a method's name, split at colons; the error says what is wrong.
@@ -269,7 +330,8 @@ pub struct Row {
 }
 
 /// Every representation there is.
-pub static TABLE: &[Row] = &[fixed::ROW, naive::ROW, toksvig::ROW, ndm::ROW, slopes::ROW, sh::ROW];
+pub static TABLE: &[Row] =
+    &[fixed::ROW, naive::ROW, toksvig::ROW, ndm::ROW, slopes::ROW, sh::ROW, vmf::ROW, gmm::ROW];
 
 /// A spelling that names no representation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use ndfmap_core::ndf::Decoded;
+use ndfmap_core::ndf::{Decoded, MixtureLobe, PlanarLobe};
 use ndfmap_core::surface::{SurfaceRow, integrability, slope_of_normal};
 use ndfmap_maps::formats::{read_file, read_ndf};
 use ndfmap_maps::source::{BUILTIN_PREFIX, read_source};
@@ -125,8 +125,22 @@ fn describe(decoded: Decoded) -> Value {
             json!({ "mean": mean.to_array(), "covariance": [[xx, xy], [xy, yy]], "height": height })
         }
         Decoded::Coefficients(gamma) => json!({ "coefficients": gamma }),
+        Decoded::Lobes(lobes) => {
+            let lobe = |l: &MixtureLobe| {
+                let kappa = l.variance.recip().min(MOST_KAPPA);
+                json!({ "layer": l.layer, "weight": l.weight, "mean": l.mean.to_array(), "kappa": kappa })
+            };
+            json!({ "lobes": lobes.iter().map(lobe).collect::<Vec<_>>() })
+        }
+        Decoded::PlanarLobes(lobes) => {
+            let lobe = |l: &PlanarLobe| json!({ "layer": l.layer, "weight": l.weight, "mean": l.mean.to_array(), "variance": l.variance });
+            json!({ "lobes": lobes.iter().map(lobe).collect::<Vec<_>>() })
+        }
     }
 }
+
+/// `kappa` of a lobe whose stored form can tell no spread; JSON has no infinity.
+const MOST_KAPPA: f64 = 1e6;
 
 /// A JSON object as lines for people, one key each.
 fn as_lines(value: &Value) -> String {

@@ -1,0 +1,468 @@
+//! Fitting: from the fine normals under each texel of each level to a few lobes, whose sums are then stored.
+//!
+//! Two questions are answered apart. *Which lobes?* Expectation maximisation (`em.rs`), then descent on the error
+//! that is seen (`refine.rs`). *Which lobe of this texel goes with which of its neighbours'?* What a filter mixes must
+//! belong together, so every alignment but `unaligned` goes from the coarsest level down and starts each texel from its
+//! parent. [`Alignment`] has the choices, from the papers' to ours. Everything works on sums of sufficient statistics
+//! (`family.rs`), so both kinds of lobe share all of it.
+//!
+//! Bytes do not depend on threads: a texel depends on its parent, its own samples and texels of earlier passes only.
+
+mod assign;
+mod coherent;
+mod em;
+mod family;
+mod matching;
+mod refine;
+mod samples;
+
+use std::ops::Range;
+
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
+
+pub use assign::MAX_LOBES;
+pub use family::Four;
+
+use self::assign::{assign, shares};
+use self::coherent::with_prior;
+use self::em::{iterate, log_likelihood, naturals, start_at_random, start_from_furthest};
+use self::family::{Family, Planar, Spherical};
+use self::matching::match_lobes;
+use self::refine::{LevelLobes, refine};
+use self::samples::{SampleGrid, Samples, Samplings};
+use crate::grid::{Grid, Size};
+use crate::pyramid::{footprint, level_sizes};
+use crate::surface::{Surface, SurfaceRow};
+
+/// The shape of the lobes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LobeKind {
+    /// Von Mises-Fisher; sums of `(1, n.x, n.y, 1 - n.z)`.
+    Spherical,
+    /// Isotropic Gaussians of `n.xy`; sums of `(1, n.x, n.y, n.x² + n.y²)`.
+    Planar,
+}
+
+/// How lobes of neighbouring texels are made to correspond.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Alignment {
+    /// Started from the parent, then moved towards the least error at texels and between them: ours.
+    #[default]
+    Refined,
+    /// Started from the parent, then plain EM.
+    Parent,
+    /// Started from the parent, EM with the papers' prior over the parent and the neighbours already fitted.
+    Prior,
+    /// Each texel by itself, its lobes then put in its parent's order.
+    Matched,
+    /// Each texel by itself.
+    Unaligned,
+}
+
+impl Alignment {
+    /// Every alignment, the default first.
+    pub const ALL: [Self; 5] = [Self::Refined, Self::Parent, Self::Prior, Self::Matched, Self::Unaligned];
+
+    /// As spelled on the command line; the default goes without saying.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Refined => "refined",
+            Self::Parent => "parent",
+            Self::Prior => "prior",
+            Self::Matched => "matched",
+            Self::Unaligned => "unaligned",
+        }
+    }
+}
+
+/// What is to be fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fit {
+    /// The shape of the lobes.
+    pub kind: LobeKind,
+    /// Lobes a texel, 1 to [`MAX_LOBES`].
+    pub lobes: usize,
+    /// How they are aligned.
+    pub alignment: Alignment,
+}
+
+/// What it is fitted to.
+pub struct FitJob<'a> {
+    /// The finest level.
+    pub surface: &'a dyn Surface,
+    /// Other maps of the same size whose values each lobe is to carry.
+    pub attributes: &'a [Grid<Four>],
+    /// Called now and then with the fraction done, from one thread.
+    pub progress: &'a (dyn Fn(f64) + Sync),
+}
+
+/// Fitted rows of a level.
+pub struct FittedRows<'a> {
+    /// Level, 0 the finest.
+    pub level: usize,
+    /// Its size.
+    pub size: Size,
+    /// Which of its rows.
+    pub rows: Range<usize>,
+    /// Sums: the lobes of a texel one after another, texel by texel. Weights of a texel sum to one.
+    pub sums: &'a [Four],
+    /// For each attribute the lobes' weighted means `alpha y`, in the order of `sums`.
+    pub attributes: &'a [Vec<Four>],
+}
+
+/// Rounds of EM for a texel that starts from furthest points.
+const ALONE_ROUNDS: usize = 40;
+
+/// Rounds of EM for a texel that starts from its parent, where nothing follows.
+const PARENT_ROUNDS: usize = 10;
+
+/// Starts tried for the coarsest texel, and rounds of EM for each.
+const STARTS: usize = 16;
+const START_ROUNDS: usize = 5;
+
+/// Rounds of EM before refinement, and of refinement for each lobe.
+const ROUNDS_BEFORE: usize = 6;
+const REFINE_ROUNDS_PER_LOBE: usize = 4;
+
+/// Levels finer than this hold few normals a texel, which EM meets exactly or nearly: they are refined less or not at all.
+const FIRST_REFINED: usize = 2;
+const FIRST_REFINED_WELL: usize = 3;
+
+/// Rows of the finest level made at a time.
+const BAND: usize = 64;
+
+/// A lobe of less weight dies: half floats could no longer hold it.
+const LEAST_WEIGHT: f32 = 1.0 / 8192.0;
+
+/// Fits every level and hands on its rows, each once, levels in no particular order.
+///
+/// # Errors
+/// The first error of `emit`, at which it stops.
+///
+/// # Panics
+/// When an attribute has another size than the surface, or `lobes` is out of range.
+pub fn fit_levels<E>(
+    fit: &Fit,
+    job: &FitJob<'_>,
+    emit: &mut dyn FnMut(&FittedRows<'_>) -> Result<(), E>,
+) -> Result<(), E> {
+    assert!((1..=MAX_LOBES).contains(&fit.lobes), "a texel has 1 to {MAX_LOBES} lobes");
+    let size = job.surface.size();
+    assert!(job.attributes.iter().all(|a| a.size() == size), "attributes are as large as the surface");
+    match fit.kind {
+        LobeKind::Spherical => Fitter::new(Spherical, fit, job).run(emit),
+        LobeKind::Planar => Fitter::new(Planar, fit, job).run(emit),
+    }
+}
+
+struct Fitter<'a, F> {
+    family: F,
+    fit: &'a Fit,
+    job: &'a FitJob<'a>,
+    sizes: Vec<Size>,
+    samplings: Samplings,
+}
+
+/// One level whose sums are known.
+struct Level {
+    size: Size,
+    sums: Vec<Four>,
+}
+
+impl Level {
+    /// The lobes of the texel that covers the middle of texel `(x, y)` of a level of `finer` size.
+    fn over(&self, finer: Size, lobes: usize, (x, y): (usize, usize)) -> &[Four] {
+        let up = |i: usize, fine: usize, coarse: usize| ((2 * i + 1) * coarse / (2 * fine)).min(coarse - 1);
+        let at =
+            up(y, finer.height, self.size.height) * self.size.width + up(x, finer.width, self.size.width);
+        &self.sums[at * lobes..][..lobes]
+    }
+}
+
+impl<'a, F: Family> Fitter<'a, F> {
+    fn new(family: F, fit: &'a Fit, job: &'a FitJob<'a>) -> Self {
+        let sizes = level_sizes(job.surface.size());
+        let samplings = Samplings::new(family, job.surface, &sizes);
+        Self { family, fit, job, sizes, samplings }
+    }
+
+    fn run<E>(&self, emit: &mut dyn FnMut(&FittedRows<'_>) -> Result<(), E>) -> Result<(), E> {
+        (self.job.progress)(0.05);
+        match self.fit.alignment {
+            Alignment::Unaligned => {
+                for (level, made) in self.alone().into_iter().enumerate().skip(1) {
+                    self.hand_on(level, &made, emit)?;
+                }
+                self.finest(None, emit)
+            }
+            Alignment::Matched => {
+                let mut levels = self.alone();
+                for coarse in (1..levels.len() - 1).rev() {
+                    let (finer, parents) = levels.split_at_mut(coarse + 1);
+                    let (parent, child) = (&parents[0], &mut finer[coarse]);
+                    let size = child.size;
+                    child.sums.par_chunks_mut(self.fit.lobes).enumerate().for_each(|(i, sums)| {
+                        match_lobes(self.family, parent.over(size, self.fit.lobes, at(size, i)), sums);
+                    });
+                }
+                for (level, made) in levels.iter().enumerate().skip(1) {
+                    self.hand_on(level, made, emit)?;
+                }
+                self.finest(levels.get(1), emit)
+            }
+            _ => {
+                let mut parent: Option<Level> = None;
+                for level in (1..self.sizes.len()).rev() {
+                    let made = self.descend(level, parent.as_ref());
+                    self.hand_on(level, &made, emit)?;
+                    parent = Some(made);
+                    (self.job.progress)(1.0 - 0.9 * level as f64 / self.sizes.len() as f64);
+                }
+                self.finest(parent.as_ref(), emit)
+            }
+        }
+    }
+
+    /// Runs `texel` on the samples and sums of every texel of a level.
+    fn each_texel(
+        &self,
+        grid: &SampleGrid,
+        level: &mut Level,
+        texel: impl Fn(usize, &Samples, &mut [Four]) + Sync,
+    ) {
+        let size = level.size;
+        let texels = level.sums.par_chunks_mut(self.fit.lobes).enumerate();
+        texels.for_each_init(Samples::default, |samples, (i, sums)| {
+            grid.gather(size, at(size, i), samples);
+            texel(i, samples, sums);
+        });
+    }
+
+    fn empty(&self, level: usize) -> Level {
+        let size = self.sizes[level];
+        Level { size, sums: vec![[0.0; 4]; size.area() * self.fit.lobes] }
+    }
+
+    /// Every level above the finest, each texel by itself: the better of EM from the normals furthest apart, and from the
+    /// furthest of the lobes of the finer texels below it.
+    fn alone(&self) -> Vec<Level> {
+        let lobes = self.fit.lobes;
+        let mut levels = vec![Level { size: self.sizes[0], sums: Vec::new() }];
+        for level in 1..self.sizes.len() {
+            let mut made = self.empty(level);
+            let (size, finer) = (made.size, &levels[level - 1]);
+            self.each_texel(self.samplings.for_level(size), &mut made, |i, samples, sums| {
+                start_from_furthest(samples, samples, sums);
+                iterate(self.family, samples, ALONE_ROUNDS, sums);
+                if level == 1 {
+                    return;
+                }
+                let mut other = [[0.0; 4]; MAX_LOBES];
+                let other = &mut other[..lobes];
+                start_from_furthest(&lobe_means(finer, lobes, size, at(size, i)), samples, other);
+                iterate(self.family, samples, ALONE_ROUNDS, other);
+                let likely = |sums: &[Four]| log_likelihood(self.family, samples, sums);
+                if likely(other) > likely(sums) {
+                    sums.copy_from_slice(other);
+                }
+            });
+            levels.push(made);
+            (self.job.progress)(0.05 + 0.85 * level as f64 / self.sizes.len() as f64);
+        }
+        levels
+    }
+
+    /// A level started from its parent, or from furthest points where there is none.
+    fn descend(&self, level: usize, parent: Option<&Level>) -> Level {
+        let (family, lobes) = (self.family, self.fit.lobes);
+        let mut made = self.empty(level);
+        let size = made.size;
+        let grid = self.samplings.for_level(size);
+        let refined = self.fit.alignment == Alignment::Refined;
+        let rounds = match parent {
+            None => 0,
+            Some(_) if refined => ROUNDS_BEFORE,
+            Some(_) => PARENT_ROUNDS,
+        };
+        let prior = self.fit.alignment == Alignment::Prior && parent.is_some();
+        self.each_texel(grid, &mut made, |i, samples, sums| {
+            match parent {
+                Some(parent) => {
+                    let mut theta = [[0.0; 4]; MAX_LOBES];
+                    naturals(family, parent.over(size, lobes, at(size, i)), &mut theta[..lobes]);
+                    assign(&theta[..lobes], samples, sums);
+                }
+                None => self.start(samples, sums),
+            }
+            if !prior {
+                iterate(family, samples, rounds, sums);
+            }
+        });
+        if let (true, Some(parent)) = (prior, parent) {
+            with_prior(self, grid, parent, &mut made);
+        }
+        if refined && level >= FIRST_REFINED {
+            let rounds =
+                REFINE_ROUNDS_PER_LOBE * if level >= FIRST_REFINED_WELL { lobes } else { lobes.div_ceil(2) };
+            refine(family, grid, &mut LevelLobes { size, lobes, sums: &mut made.sums }, rounds);
+        }
+        made.sums.par_chunks_mut(lobes).for_each(bury);
+        made
+    }
+
+    /// The start of the coarsest texel, which all others inherit: of several, the one whose lobes are narrowest.
+    ///
+    /// Not the likeliest, nor the one of least error there: what the levels below need is lobes that divide the normals
+    /// well, as in k-means, and that measured better on both counts. For the same reason EM stays short.
+    fn start(&self, samples: &Samples, sums: &mut [Four]) {
+        start_from_furthest(samples, samples, sums);
+        let mut least = f32::MAX;
+        let mut best = [[0.0; 4]; MAX_LOBES];
+        let mut random = Pcg64Mcg::seed_from_u64(0);
+        for _ in 0..STARTS {
+            iterate(self.family, samples, START_ROUNDS, sums);
+            let width = sums.iter().map(|s| s[0] * self.family.decode(s).variance).sum();
+            if width < least {
+                least = width;
+                best[..sums.len()].copy_from_slice(sums);
+            }
+            start_at_random(samples, &mut random, sums);
+        }
+        sums.copy_from_slice(&best[..sums.len()]);
+    }
+
+    /// Hands on a level with the attributes of its lobes.
+    fn hand_on<E>(
+        &self,
+        level: usize,
+        made: &Level,
+        emit: &mut dyn FnMut(&FittedRows<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let attributes: Vec<Vec<Four>> = self.job.attributes.iter().map(|a| self.carry(made, a)).collect();
+        emit(&FittedRows {
+            level,
+            size: made.size,
+            rows: 0..made.size.height,
+            sums: &made.sums,
+            attributes: &attributes,
+        })
+    }
+
+    /// Each lobe's mean of an attribute, `y_j = Σ z_ij y_i / Σ z_ij`, times its weight (Han et al. 2007, section 6.4).
+    fn carry(&self, made: &Level, attribute: &Grid<Four>) -> Vec<Four> {
+        let (lobes, size, fine) = (self.fit.lobes, made.size, attribute.size());
+        let mut carried = vec![[0.0; 4]; made.sums.len()];
+        carried.par_chunks_mut(lobes).zip(made.sums.par_chunks(lobes)).enumerate().for_each_init(
+            Samples::default,
+            |samples, (i, (carried, sums))| {
+                let (x, y) = at(size, i);
+                self.samplings.finest().gather(size, (x, y), samples);
+                let mut theta = [[0.0; 4]; MAX_LOBES];
+                naturals(self.family, sums, &mut theta[..lobes]);
+                let (rows, _) = footprint(fine.height, size.height, y);
+                let (columns, _) = footprint(fine.width, size.width, x);
+                let places = rows.flat_map(|r| columns.clone().map(move |c| (r, c)));
+                let mut weights = [0.0_f32; MAX_LOBES];
+                let mut z = [0.0; MAX_LOBES];
+                for (k, (r, c)) in places.enumerate() {
+                    shares(&theta[..lobes], [samples.a[k], samples.b[k], samples.c[k]], &mut z[..lobes]);
+                    let value = attribute.row(r)[c];
+                    for (j, carried) in carried.iter_mut().enumerate() {
+                        let z = z[j] * samples.weight[k];
+                        weights[j] += z;
+                        (0..4).for_each(|k| carried[k] += z * value[k]);
+                    }
+                }
+                for ((carried, sums), weight) in carried.iter_mut().zip(sums).zip(weights) {
+                    // A dead lobe, or one that refinement moved to where no normal is, carries nothing of its own.
+                    let scale = if weight > 0.0 { sums[0] / weight } else { 0.0 };
+                    carried.iter_mut().for_each(|c| *c *= scale);
+                }
+            },
+        );
+        carried
+    }
+
+    /// The finest level, band by band: each normal is one lobe, in the place that its parent gives it.
+    fn finest<E>(
+        &self,
+        parent: Option<&Level>,
+        emit: &mut dyn FnMut(&FittedRows<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let (lobes, size) = (self.fit.lobes, self.sizes[0]);
+        for start in (0..size.height).step_by(BAND) {
+            let rows = start..(start + BAND).min(size.height);
+            let mut sums = vec![[0.0; 4]; rows.len() * size.width * lobes];
+            let mut attributes = vec![sums.clone(); self.job.attributes.len()];
+            let mut places = vec![0_usize; rows.len() * size.width];
+            let lines = sums.par_chunks_mut(size.width * lobes).zip(places.par_chunks_mut(size.width));
+            lines.enumerate().for_each_init(
+                || SurfaceRow::flat(size.width),
+                |row, (r, (sums, places))| {
+                    let y = start + r;
+                    self.job.surface.read_row(y, row);
+                    for x in 0..size.width {
+                        let t = self.family.statistics(row.normal(x));
+                        places[x] = parent.map_or(0, |p| self.place(p.over(size, lobes, (x, y)), t));
+                        sums[x * lobes + places[x]] = [1.0, t[0], t[1], t[2]];
+                    }
+                },
+            );
+            for (carried, attribute) in attributes.iter_mut().zip(self.job.attributes) {
+                for (i, place) in places.iter().enumerate() {
+                    carried[i * lobes + place] = attribute.row(start + i / size.width)[i % size.width];
+                }
+            }
+            emit(&FittedRows { level: 0, size, rows: rows.clone(), sums: &sums, attributes: &attributes })?;
+            (self.job.progress)(0.9 + 0.1 * rows.end as f64 / size.height as f64);
+        }
+        Ok(())
+    }
+
+    /// The likeliest of the parent's lobes.
+    fn place(&self, parent: &[Four], t: [f32; 3]) -> usize {
+        let log = |sums: &Four| {
+            let theta = self.family.natural(sums);
+            theta[0] + theta[1] * t[0] + theta[2] * t[1] + theta[3] * t[2]
+        };
+        let mut best = (0, f32::MIN);
+        for (j, sums) in parent.iter().enumerate() {
+            let log = log(sums);
+            if log > best.1 {
+                best = (j, log);
+            }
+        }
+        best.0
+    }
+}
+
+/// Column and row of texel `i`.
+fn at(size: Size, i: usize) -> (usize, usize) {
+    (i % size.width, i / size.width)
+}
+
+/// Removes lobes too light to store; the others take over their weight.
+fn bury(sums: &mut [Four]) {
+    let light = |s: &Four| s[0] < LEAST_WEIGHT;
+    let kept: f32 = sums.iter().filter(|s| !light(s)).map(|s| s[0]).sum();
+    for sums in sums.iter_mut() {
+        *sums = if light(sums) { [0.0; 4] } else { sums.map(|s| s / kept) };
+    }
+}
+
+/// Means of all lobes of the finer texels under a texel.
+fn lobe_means(finer: &Level, lobes: usize, size: Size, (x, y): (usize, usize)) -> Samples {
+    let mut means = Samples::default();
+    let (columns, _) = footprint(finer.size.width, size.width, x);
+    let (rows, _) = footprint(finer.size.height, size.height, y);
+    for r in rows {
+        let line = &finer.sums[(r * finer.size.width + columns.start) * lobes..][..columns.len() * lobes];
+        for [alpha, a, b, c] in line.iter().filter(|s| s[0] > LEAST_WEIGHT) {
+            means.push(*alpha, [a / alpha, b / alpha, c / alpha]);
+        }
+    }
+    means
+}

@@ -1,0 +1,160 @@
+//! `gmm:J`: a mixture of isotropic Gaussians in the plane of `n.xy`, fitted and aligned. Tan et al. 2005, section 4.
+//!
+//! Lobe i holds `alpha, alpha mu, alpha (2 sigma² + |mu|²)`: with `sigma²` a variance on one axis, `E|n.xy|²` is
+//! `2 sigma² + |mu|²`, and that is what mixes linearly. The paper prints `sigma² + |mu|²` in and `E - |mu|²` out, mixing a
+//! variance on one axis with one on two, which doubles the spread between means; `gmm:J:printed` keeps that.
+//! A lobe is shaded in the plane too: the BRDF widened by `sigma²`, as a function of `|w.xy - mu|`, which for a Gaussian
+//! BRDF lobe is the paper's sum of variances.
+
+use glam::{DVec2, DVec3};
+
+use super::mixture::{Lobes, MixtureEvaluator, Shaded, parse_mixture};
+use super::{Decoded, Evaluator, Method, PlanarLobe, Representation, Row, Sample};
+use crate::brdf::Brdf;
+use crate::fit::{Fit, Four, LobeKind, MAX_LOBES};
+use crate::units::SlopeVariance;
+
+/// Planar Gaussian lobes.
+#[derive(Clone, Copy, Debug)]
+pub struct Gmm {
+    fit: Fit,
+    /// Variances interpolated as printed.
+    printed: bool,
+}
+
+pub(super) const ROW: Row = Row {
+    name: "gmm",
+    parameters: ":J[:ALIGNMENT][:printed]",
+    summary: "J = 1..8 planar Gaussians, aligned as `vmf` is; `prior` is the paper's own",
+    paper: "Tan et al. 2005, section 4; refined is ours",
+    parse,
+    samples: &["gmm:4", "gmm:1", "gmm:4:prior", "gmm:3:parent", "gmm:2:unaligned", "gmm:4:printed"],
+};
+
+fn parse(words: &[&str]) -> Result<Box<dyn Method>, String> {
+    let (fit, printed) = parse_mixture(words, LobeKind::Planar, "printed", "gmm")?;
+    Ok(Box::new(Gmm { fit, printed }))
+}
+
+/// The mixture a texel stands for; means are `(x, y, 0)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GaussianMixture {
+    /// Lobes that are alive.
+    pub lobes: Vec<Shaded>,
+}
+
+impl From<GaussianMixture> for Decoded {
+    fn from(mixture: GaussianMixture) -> Self {
+        let lobe = |l: &Shaded| PlanarLobe {
+            layer: l.layer,
+            weight: l.weight,
+            mean: l.mean.truncate(),
+            variance: l.variance.get(),
+        };
+        Self::PlanarLobes(mixture.lobes.iter().map(lobe).collect())
+    }
+}
+
+/// `w · n` of a normal as far from `w` as the two are in the plane: what the BRDF's own profile is a function of.
+///
+/// The plane is that of the upper hemisphere; below it nothing is reflected.
+fn planar_cosine(w: DVec3, mu: DVec3) -> f64 {
+    if w.z <= 0.0 {
+        return -1.0;
+    }
+    let far = DVec2::new(w.x - mu.x, w.y - mu.y).length_squared();
+    (1.0 - far).max(0.0).sqrt()
+}
+
+impl Gmm {
+    fn lobes(&self, sums: &Lobes) -> Vec<Shaded> {
+        let total = sums.total();
+        let lobe = |(layer, &[alpha, x, y, q]): (usize, &Four)| {
+            let alpha = f64::from(alpha);
+            let (x, y, q) = (f64::from(x) / alpha, f64::from(y) / alpha, f64::from(q) / alpha);
+            let second = q - x * x - y * y;
+            let variance = SlopeVariance::clamped(if self.printed { second } else { second / 2.0 });
+            // Damaged files aside, means lie in the unit disk.
+            let mean = DVec3::new(x.clamp(-1.5, 1.5), y.clamp(-1.5, 1.5), 0.0);
+            Shaded { layer, weight: alpha / total, mean, variance }
+        };
+        sums.alive().map(lobe).collect()
+    }
+}
+
+impl Representation for Gmm {
+    type Sums = Lobes;
+    type Lobes = GaussianMixture;
+
+    fn spelling(&self) -> String {
+        super::mixture::spell(ROW.name, &self.fit, self.printed.then_some("printed"))
+    }
+
+    fn layers(&self) -> usize {
+        self.fit.lobes
+    }
+
+    fn encoding(&self) -> &'static str {
+        if self.printed { "sums-as-printed" } else { "sums" }
+    }
+
+    fn zero(&self) -> Lobes {
+        Lobes::zero(self.fit.lobes)
+    }
+
+    /// Without a fit, all normals go to the first lobe.
+    fn accumulate(&self, sums: &mut Lobes, sample: &Sample, weight: f32) {
+        let [x, y, _] = sample.normal.to_array();
+        sums.add(0, [1.0, x, y, x * x + y * y], weight);
+    }
+
+    fn blend(&self, sums: &mut Lobes, part: &Lobes, weight: f32) {
+        sums.blend(part, weight);
+    }
+
+    fn pack(&self, sums: &Lobes, channels: &mut [f32]) {
+        channels.as_chunks_mut().0.iter_mut().zip(sums.all()).for_each(|(rgba, lobe)| *rgba = *lobe);
+    }
+
+    fn unpack(&self, channels: &[f32]) -> Lobes {
+        let mut sums = self.zero();
+        for (j, rgba) in channels.as_chunks().0.iter().take(self.fit.lobes.min(MAX_LOBES)).enumerate() {
+            sums.add(j, *rgba, 1.0);
+        }
+        sums
+    }
+
+    fn decode(&self, sums: &Lobes) -> GaussianMixture {
+        GaussianMixture { lobes: self.lobes(sums) }
+    }
+
+    fn effective<'a>(
+        &'a self,
+        lobes: &GaussianMixture,
+        brdf: &'a dyn Brdf,
+    ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+        let widened: Vec<(f64, DVec3, Box<dyn Brdf>)> =
+            lobes.lobes.iter().map(|l| (l.weight, l.mean, brdf.widen(l.variance))).collect();
+        Box::new(move |w| {
+            widened.iter().map(|(weight, mu, lobe)| weight * lobe.evaluate(planar_cosine(w, *mu))).sum()
+        })
+    }
+
+    fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
+        let lobes = |channels: &[f32]| self.lobes(&self.unpack(channels));
+        Box::new(MixtureEvaluator { lobes, cosine: planar_cosine, brdf, directions })
+    }
+
+    fn fit(&self) -> Option<Fit> {
+        Some(self.fit)
+    }
+
+    /// From `alpha (2 sigma² + |mu|²)` to what the paper stores.
+    fn store_lobe(&self, &[alpha, x, y, q]: &Four) -> Four {
+        if !self.printed || alpha <= 0.0 {
+            return [alpha, x, y, q];
+        }
+        let square = (x * x + y * y) / alpha;
+        [alpha, x, y, square + 0.5 * (q - square)]
+    }
+}

@@ -1,0 +1,164 @@
+//! What the fitted mixtures share: sums of several lobes, spellings, and an evaluator.
+
+use glam::DVec3;
+
+use super::Evaluator;
+use crate::brdf::Brdf;
+use crate::fit::{Alignment, Fit, Four, LobeKind, MAX_LOBES};
+use crate::units::SlopeVariance;
+
+/// Sums of every lobe: weight, then three statistics times the weight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lobes {
+    sums: [Four; MAX_LOBES],
+    count: usize,
+}
+
+/// Share of a texel's weight below which a lobe says nothing: a few steps of a half float.
+const DEAD: f32 = 1e-5;
+
+impl Lobes {
+    /// Sums over nothing.
+    pub(super) fn zero(count: usize) -> Self {
+        Self { sums: [[0.0; 4]; MAX_LOBES], count }
+    }
+
+    /// Adds to lobe `j`.
+    pub(super) fn add(&mut self, j: usize, values: Four, weight: f32) {
+        self.sums[j].iter_mut().zip(values).for_each(|(sum, v)| *sum += weight * v);
+    }
+
+    /// Adds the sums of a part.
+    pub(super) fn blend(&mut self, part: &Self, weight: f32) {
+        (0..self.count).for_each(|j| self.add(j, part.sums[j], weight));
+    }
+
+    /// Every lobe's sums.
+    #[must_use]
+    pub fn all(&self) -> &[Four] {
+        &self.sums[..self.count]
+    }
+
+    /// Those of lobes that say something, with their places.
+    pub(super) fn alive(&self) -> impl Iterator<Item = (usize, &Four)> {
+        self.all().iter().enumerate().filter(|(_, s)| s[0] > DEAD)
+    }
+
+    /// Weight of those.
+    pub(super) fn total(&self) -> f64 {
+        self.alive().map(|(_, s)| f64::from(s[0])).sum()
+    }
+}
+
+/// A decoded lobe, ready to be shaded: the BRDF widened by `variance`, around `mean`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shaded {
+    /// Its layer.
+    pub layer: usize,
+    /// Share of the texel; they sum to one.
+    pub weight: f64,
+    /// Mean direction; for planar lobes `(x, y, 0)`.
+    pub mean: DVec3,
+    /// Spread on one axis.
+    pub variance: SlopeVariance,
+}
+
+/// Reads `J[:ALIGNMENT][:WORD]`; the second result says whether the word was there.
+pub(super) fn parse_mixture(
+    words: &[&str],
+    kind: LobeKind,
+    word: &str,
+    name: &str,
+) -> Result<(Fit, bool), String> {
+    let count =
+        || format!("the number of lobes must be a whole number from 1 to {MAX_LOBES}, as in `{name}:4`");
+    let (lobes, rest) = words.split_first().ok_or_else(count)?;
+    let lobes = match lobes.parse() {
+        Ok(n @ 1..=MAX_LOBES) => n,
+        _ => return Err(count()),
+    };
+    let mut fit = Fit { kind, lobes, alignment: Alignment::default() };
+    let (rest, flag) = match rest.split_last() {
+        Some((last, rest)) if *last == word => (rest, true),
+        _ => (rest, false),
+    };
+    match rest {
+        [] => {}
+        [alignment] => {
+            let known = Alignment::ALL.iter().find(|a| a.name() == *alignment);
+            fit.alignment = *known.ok_or_else(|| {
+                let names: Vec<&str> = Alignment::ALL.iter().map(|a| a.name()).collect();
+                format!("`{alignment}` is no alignment; there are {}, and then `{word}`", names.join(", "))
+            })?;
+        }
+        _ => return Err(format!("takes the number of lobes, an alignment and `{word}`, no more")),
+    }
+    Ok((fit, flag))
+}
+
+/// The spelling of a mixture; the default alignment goes without saying.
+pub(super) fn spell(name: &str, fit: &Fit, word: Option<&str>) -> String {
+    let mut text = format!("{name}:{}", fit.lobes);
+    if fit.alignment != Alignment::default() {
+        text += &format!(":{}", fit.alignment.name());
+    }
+    if let Some(word) = word {
+        text += &format!(":{word}");
+    }
+    text
+}
+
+/// Evaluates mixtures direction by direction, leaving out what lies beyond a lobe's reach.
+pub(super) struct MixtureEvaluator<'a, L, C> {
+    /// Decodes channels.
+    pub(super) lobes: L,
+    /// The BRDF's argument for a direction and a mean.
+    pub(super) cosine: C,
+    pub(super) brdf: &'a dyn Brdf,
+    pub(super) directions: &'a [DVec3],
+}
+
+/// Values below this part of a lobe's peak are left out.
+const NEGLIGIBLE: f64 = 1e-10;
+
+/// The least cosine at which a falling lobe is not negligible.
+fn least_cosine(lobe: &dyn Brdf) -> f64 {
+    let peak = lobe.evaluate(1.0);
+    let (mut dark, mut bright) = (-1.0, 1.0);
+    if lobe.evaluate(dark) > NEGLIGIBLE * peak {
+        return dark;
+    }
+    for _ in 0..40 {
+        let middle = 0.5 * (dark + bright);
+        if lobe.evaluate(middle) > NEGLIGIBLE * peak { bright = middle } else { dark = middle }
+    }
+    dark
+}
+
+impl<L, C> Evaluator for MixtureEvaluator<'_, L, C>
+where
+    L: Fn(&[f32]) -> Vec<Shaded> + Send + Sync,
+    C: Fn(DVec3, DVec3) -> f64 + Send + Sync,
+{
+    fn evaluate(&self, channels: &[f32], out: &mut [f64]) {
+        out.fill(0.0);
+        let (mut places, mut values) = (Vec::new(), Vec::new());
+        for lobe in (self.lobes)(channels) {
+            let widened = self.brdf.widen(lobe.variance);
+            let least = least_cosine(&*widened);
+            places.clear();
+            values.clear();
+            for (i, w) in self.directions.iter().enumerate() {
+                let u = (self.cosine)(*w, lobe.mean);
+                if u >= least {
+                    places.push(i);
+                    values.push(u);
+                }
+            }
+            widened.evaluate_all(&mut values);
+            for (i, f) in places.iter().zip(&values) {
+                out[*i] += lobe.weight * f;
+            }
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! `vmf:J`: a mixture of von Mises-Fisher lobes, fitted and aligned. Han et al. 2007, section 6.
+//!
+//! Lobe j holds `alpha, alpha r`, r the mean of its normals: a partition of what `toksvig` keeps. Filtered sums decode as
+//! `r = T(alpha r)/T(alpha)`, `kappa = (3|r| - |r|³)/(1 - |r|²)` (Banerjee et al. 2005), mean direction `r/|r|`. A lobe is
+//! shaded as the BRDF widened by the slope variance `1/kappa`, which for Blinn-Phong is `s' = kappa s/(kappa + s)`, for
+//! Torrance-Sparrow `sigma'² = sigma² + 1/(2 kappa)`, for Beckmann and GGX `alpha'² = alpha² + 2/kappa`.
+//!
+//! Stored about the pole, `alpha (1 - r.z)` in place of `alpha r.z`: as linear, and in half floats `1 - |r|²` keeps its
+//! digits (`docs/methods.md` has what that gains). `vmf:J:origin` stores the paper's form.
+
+use glam::DVec3;
+
+use super::mixture::{Lobes, MixtureEvaluator, Shaded, parse_mixture};
+use super::{Decoded, Evaluator, Method, MixtureLobe, Representation, Row, Sample};
+use crate::brdf::Brdf;
+use crate::fit::{Fit, Four, LobeKind, MAX_LOBES};
+use crate::units::SlopeVariance;
+
+/// Von Mises-Fisher lobes.
+#[derive(Clone, Copy, Debug)]
+pub struct Vmf {
+    fit: Fit,
+    /// Stored as the paper has it.
+    origin: bool,
+}
+
+pub(super) const ROW: Row = Row {
+    name: "vmf",
+    parameters: ":J[:ALIGNMENT][:origin]",
+    summary: "J = 1..8 von Mises-Fisher lobes, aligned: refined (default), parent, prior, matched or unaligned",
+    paper: "Han et al. 2007, section 6; refined is ours",
+    parse,
+    samples: &[
+        "vmf:4",
+        "vmf:1",
+        "vmf:8",
+        "vmf:4:origin",
+        "vmf:3:parent",
+        "vmf:2:prior",
+        "vmf:3:matched",
+        "vmf:4:unaligned",
+    ],
+};
+
+fn parse(words: &[&str]) -> Result<Box<dyn Method>, String> {
+    let (fit, origin) = parse_mixture(words, LobeKind::Spherical, "origin", "vmf")?;
+    Ok(Box::new(Vmf { fit, origin }))
+}
+
+/// Shortest `|r|` that has a direction; below it a lobe is as wide as a lobe can be said to be.
+const MIN_LENGTH: f64 = 1e-3;
+
+impl Vmf {
+    /// The lobes that the sums decode to, dead ones left out.
+    fn lobes(sums: &Lobes) -> Vec<Shaded> {
+        let total = sums.total();
+        let lobe = |(layer, &[alpha, x, y, w]): (usize, &Four)| {
+            let alpha = f64::from(alpha);
+            let (x, y, w) = (f64::from(x) / alpha, f64::from(y) / alpha, f64::from(w) / alpha);
+            // 1 - |r|² of r = (x, y, 1 - w).
+            let short = (2.0 * w - w * w - x * x - y * y).clamp(0.0, 1.0);
+            let length = (1.0 - short).sqrt().max(MIN_LENGTH);
+            let mean = DVec3::new(x, y, 1.0 - w).try_normalize().unwrap_or(DVec3::Z);
+            let variance = SlopeVariance::clamped(short / (length * (3.0 - length * length)));
+            Shaded { layer, weight: alpha / total, mean, variance }
+        };
+        sums.alive().map(lobe).collect()
+    }
+}
+
+/// The mixture a texel stands for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VmfMixture {
+    /// Lobes that are alive.
+    pub lobes: Vec<Shaded>,
+}
+
+impl From<VmfMixture> for Decoded {
+    fn from(mixture: VmfMixture) -> Self {
+        let lobe = |l: &Shaded| MixtureLobe {
+            layer: l.layer,
+            weight: l.weight,
+            mean: l.mean,
+            variance: l.variance.get(),
+        };
+        Self::Lobes(mixture.lobes.iter().map(lobe).collect())
+    }
+}
+
+impl Representation for Vmf {
+    type Sums = Lobes;
+    type Lobes = VmfMixture;
+
+    fn spelling(&self) -> String {
+        super::mixture::spell(ROW.name, &self.fit, self.origin.then_some("origin"))
+    }
+
+    fn layers(&self) -> usize {
+        self.fit.lobes
+    }
+
+    fn encoding(&self) -> &'static str {
+        if self.origin { "sums" } else { "sums-about-pole" }
+    }
+
+    fn zero(&self) -> Lobes {
+        Lobes::zero(self.fit.lobes)
+    }
+
+    /// Without a fit, all normals go to the first lobe.
+    fn accumulate(&self, sums: &mut Lobes, sample: &Sample, weight: f32) {
+        let [x, y, z] = sample.normal.to_array();
+        let from_pole = if z > 0.0 { (x * x + y * y) / (1.0 + z) } else { 1.0 - z };
+        sums.add(0, [1.0, x, y, from_pole], weight);
+    }
+
+    fn blend(&self, sums: &mut Lobes, part: &Lobes, weight: f32) {
+        sums.blend(part, weight);
+    }
+
+    fn pack(&self, sums: &Lobes, channels: &mut [f32]) {
+        channels
+            .as_chunks_mut()
+            .0
+            .iter_mut()
+            .zip(sums.all())
+            .for_each(|(rgba, lobe)| *rgba = Representation::store_lobe(self, lobe));
+    }
+
+    /// From `alpha (1 - r.z)` to `alpha r.z`, where asked.
+    fn store_lobe(&self, &[alpha, x, y, w]: &Four) -> Four {
+        [alpha, x, y, if self.origin { alpha - w } else { w }]
+    }
+
+    fn unpack(&self, channels: &[f32]) -> Lobes {
+        let mut sums = self.zero();
+        for (j, &[alpha, x, y, w]) in
+            channels.as_chunks().0.iter().take(self.fit.lobes.min(MAX_LOBES)).enumerate()
+        {
+            sums.add(j, [alpha, x, y, if self.origin { alpha - w } else { w }], 1.0);
+        }
+        sums
+    }
+
+    fn decode(&self, sums: &Lobes) -> VmfMixture {
+        VmfMixture { lobes: Self::lobes(sums) }
+    }
+
+    fn effective<'a>(&'a self, lobes: &VmfMixture, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+        let widened: Vec<(f64, DVec3, Box<dyn Brdf>)> =
+            lobes.lobes.iter().map(|l| (l.weight, l.mean, brdf.widen(l.variance))).collect();
+        Box::new(move |w| widened.iter().map(|(weight, mu, lobe)| weight * lobe.evaluate(w.dot(*mu))).sum())
+    }
+
+    fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
+        let lobes = |channels: &[f32]| Self::lobes(&self.unpack(channels));
+        Box::new(MixtureEvaluator { lobes, cosine: |w: DVec3, mu: DVec3| w.dot(mu), brdf, directions })
+    }
+
+    fn fit(&self) -> Option<Fit> {
+        Some(self.fit)
+    }
+}
