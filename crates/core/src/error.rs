@@ -61,6 +61,12 @@ impl<'a> Truth<'a> {
         Self { size, normals, brdf, lattice, reach: reach(brdf) }
     }
 
+    /// Size of the finest level.
+    #[must_use]
+    pub fn size(&self) -> Size {
+        self.size
+    }
+
     /// Adds `weight f(w · n)` for every direction that the lobe around `n` reaches.
     fn splat(&self, n: DVec3, weight: f64, scratch: &mut [f64], out: &mut [f64]) {
         // The cap of half-angle r around n spans cos r n.x ± sin r sqrt(1 - n.x²) in x, likewise in y.

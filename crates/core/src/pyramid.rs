@@ -224,9 +224,8 @@ impl Pyramid {
         channels
     }
 
-    /// Bilinear look-up on one level at `uv` (both 0..1 over the map, v down the rows).
-    #[must_use]
-    pub fn bilinear(&self, level: usize, uv: DVec2) -> Vec<f32> {
+    /// The four texels around `uv` on one level, and what a bilinear filter weighs them.
+    fn around(&self, level: usize, uv: DVec2) -> [Neighbour; 4] {
         let size = self.sizes[level];
         let axis = |t: f64, n: usize, wrap: Wrap| {
             let t = if t.is_finite() { t } else { 0.0 };
@@ -239,14 +238,46 @@ impl Pyramid {
             let index = |d: isize| wrap.index(floor as isize + d, n);
             [(index(0), 1.0 - (at - floor)), (index(1), at - floor)]
         };
+        let columns = axis(uv.x, size.width, self.wraps.x);
+        let rows = axis(uv.y, size.height, self.wraps.y);
+        [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(j, i)| {
+            let ((y, wy), (x, wx)) = (rows[j], columns[i]);
+            Neighbour { level, x, y, weight: wx * wy }
+        })
+    }
+
+    /// The texels that a trilinear filter mixes at `uv` and `lod`, eight at most, and what it weighs them.
+    ///
+    /// What shades each and blends the results shows what filtering should have given, at several times the cost.
+    #[must_use]
+    pub fn neighbours(&self, uv: DVec2, lod: f64) -> Vec<Neighbour> {
+        let (level, t) = self.levels_of(lod);
+        let mut all = Vec::with_capacity(8);
+        for (level, share) in [(level, 1.0 - t), (level + 1, t)] {
+            if share > 0.0 {
+                let near = self.around(level, uv).into_iter();
+                all.extend(
+                    near.map(|n| Neighbour { weight: n.weight * share, ..n }).filter(|n| n.weight > 0.0),
+                );
+            }
+        }
+        all
+    }
+
+    /// The finer of the two levels at `lod`, and the share of the coarser.
+    fn levels_of(&self, lod: f64) -> (usize, f64) {
+        let last = self.sizes.len() - 1;
+        let lod = if lod.is_nan() { 0.0 } else { lod.clamp(0.0, last as f64) };
+        (lod.floor() as usize, lod - lod.floor())
+    }
+
+    /// Bilinear look-up on one level at `uv` (both 0..1 over the map, v down the rows).
+    #[must_use]
+    pub fn bilinear(&self, level: usize, uv: DVec2) -> Vec<f32> {
         let mut sums = vec![0.0_f64; 4 * self.layers];
-        for (y, wy) in axis(uv.y, size.height, self.wraps.y) {
-            for (x, wx) in axis(uv.x, size.width, self.wraps.x) {
-                if wx * wy > 0.0 {
-                    for (sum, c) in sums.iter_mut().zip(self.texel(level, x, y)) {
-                        *sum += wx * wy * f64::from(c);
-                    }
-                }
+        for n in self.around(level, uv).iter().filter(|n| n.weight > 0.0) {
+            for (sum, c) in sums.iter_mut().zip(self.texel(level, n.x, n.y)) {
+                *sum += n.weight * f64::from(c);
             }
         }
         sums.into_iter().map(|s| s as f32).collect()
@@ -255,11 +286,10 @@ impl Pyramid {
     /// Trilinear look-up: `lod` 0 is the finest level, fractions mix two, beyond the ends is clamped.
     #[must_use]
     pub fn trilinear(&self, uv: DVec2, lod: f64) -> Vec<f32> {
-        let last = self.sizes.len() - 1;
-        let lod = if lod.is_nan() { 0.0 } else { lod.clamp(0.0, last as f64) };
-        let (level, t) = (lod.floor() as usize, (lod - lod.floor()) as f32);
+        let (level, t) = self.levels_of(lod);
         let mut channels = self.bilinear(level, uv);
         if t > 0.0 {
+            let t = t as f32;
             for (c, coarse) in channels.iter_mut().zip(self.bilinear(level + 1, uv)) {
                 *c += t * (coarse - *c);
             }
@@ -295,6 +325,19 @@ impl Pyramid {
         }
         sums
     }
+}
+
+/// A texel that a filter reads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Neighbour {
+    /// Its level.
+    pub level: usize,
+    /// Its column.
+    pub x: usize,
+    /// Its row.
+    pub y: usize,
+    /// Its share; shares sum to one.
+    pub weight: f64,
 }
 
 /// Where a pixel falls on the map, and how far it reaches.
@@ -387,6 +430,23 @@ mod tests {
         };
         let c = p.anisotropic(&footprint, 16);
         assert!((f64::from(c[0]) - 0.5).abs() < 1e-6 && (f64::from(c[1]) - 0.45).abs() < 1e-6);
+    }
+
+    #[test]
+    fn neighbours_are_what_the_filter_mixes() {
+        let p = ramp(Size { width: 16, height: 8 }, 4);
+        for (uv, lod) in
+            [(DVec2::new(0.3, 0.6), 0.0), (DVec2::new(0.01, 0.99), 1.3), (DVec2::new(0.5, 0.25), 2.5)]
+        {
+            let near = p.neighbours(uv, lod);
+            assert!(near.len() <= 8 && (near.iter().map(|n| n.weight).sum::<f64>() - 1.0).abs() < 1e-12);
+            for (c, filtered) in p.trilinear(uv, lod).iter().enumerate() {
+                let mixed: f64 =
+                    near.iter().map(|n| n.weight * f64::from(p.texel(n.level, n.x, n.y)[c])).sum();
+                // The filter works in single floats.
+                assert!((mixed - f64::from(*filtered)).abs() < 1e-6);
+            }
+        }
     }
 
     #[test]

@@ -23,12 +23,23 @@ pub struct Header {
     pub height: usize,
     /// `repeat` or `clamp`, along rows and along columns.
     pub wrap: [String; 2],
-    /// What the channels are: `sums`, or for `ndm` `sums-about-pole`.
+    /// What the channels are, such as `sums` or `sums-about-pole`.
     pub encoding: String,
-    /// Names of attributes carried by each lobe; none for linear methods.
-    pub attributes: Vec<String>,
+    /// What each lobe carries besides its normals, layer after layer behind the lobes' own; none for linear methods.
+    pub attributes: Vec<Attribute>,
     /// What it was baked from.
     pub source: Source,
+}
+
+/// A map whose values each lobe carries, times its weight.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Attribute {
+    /// File name without folders.
+    pub name: String,
+    /// Channels that mean something, 1 to 4; the others are those of `(0, 0, 0, 1)`.
+    pub channels: usize,
+    /// `linear`, or `srgb` when the file's values were decoded from sRGB. The map's own are always linear.
+    pub transfer: String,
 }
 
 /// What a map was baked from.

@@ -5,6 +5,7 @@
 //! ([`NdfMap`]) is what a bake makes: a stored pyramid and a [`Header`] that says what it holds.
 
 pub mod atomic;
+pub mod attribute;
 mod error;
 pub mod formats;
 mod header;
@@ -13,6 +14,6 @@ mod ndf_map;
 pub mod source;
 
 pub use error::MapError;
-pub use header::{Header, Source, SourceKind, VERSION};
+pub use header::{Attribute, Header, Source, SourceKind, VERSION};
 pub use image::{Image, MAX_SIDE, MAX_TEXELS, Samples};
-pub use ndf_map::NdfMap;
+pub use ndf_map::{MAX_ATTRIBUTES, NdfMap};

@@ -39,6 +39,9 @@ impl NdfMap {
     }
 }
 
+/// Attributes that a map may carry.
+pub const MAX_ATTRIBUTES: usize = 15;
+
 fn method_of(path: &Path, header: &Header) -> Result<Box<dyn Method>, MapError> {
     ndf::parse(&header.method).map_err(|e| MapError::unsupported(path, e))
 }
@@ -46,6 +49,12 @@ fn method_of(path: &Path, header: &Header) -> Result<Box<dyn Method>, MapError> 
 /// The layout that a header promises.
 pub(crate) fn layout_of(path: &Path, header: &Header, precision: Precision) -> Result<Layout, MapError> {
     let size = check_size(path, header.width, header.height)?;
-    let layers = method_of(path, header)?.layers();
+    let method = method_of(path, header)?;
+    let carried = header.attributes.len();
+    if carried > 0 && method.fit().is_none() || carried > MAX_ATTRIBUTES {
+        let reason = format!("says that `{}` carries {carried} attributes", header.method);
+        return Err(MapError::invalid(path, reason));
+    }
+    let layers = method.layers() * (1 + carried);
     Ok(Layout { size, layers, precision, wraps: header.wraps(path)? })
 }

@@ -13,6 +13,7 @@ mod coherent;
 mod em;
 mod family;
 mod matching;
+mod peaks;
 mod refine;
 mod samples;
 
@@ -24,6 +25,7 @@ use rayon::prelude::*;
 
 pub use assign::MAX_LOBES;
 pub use family::Four;
+pub use peaks::SHARPEST;
 
 use self::assign::{assign, shares};
 use self::coherent::with_prior;
@@ -43,6 +45,8 @@ pub enum LobeKind {
     Spherical,
     /// Isotropic Gaussians of `n.xy`; sums of `(1, n.x, n.y, n.x² + n.y²)`.
     Planar,
+    /// Phong peaks `(weight, n.x, n.y, exponent)`, which are no sums and cannot be filtered or aligned.
+    Peaks,
 }
 
 /// How lobes of neighbouring texels are made to correspond.
@@ -143,7 +147,7 @@ const LEAST_WEIGHT: f32 = 1.0 / 8192.0;
 /// The first error of `emit`, at which it stops.
 ///
 /// # Panics
-/// When an attribute has another size than the surface, or `lobes` is out of range.
+/// When an attribute has another size than the surface, peaks are to carry one, or `lobes` is out of range.
 pub fn fit_levels<E>(
     fit: &Fit,
     job: &FitJob<'_>,
@@ -155,6 +159,7 @@ pub fn fit_levels<E>(
     match fit.kind {
         LobeKind::Spherical => Fitter::new(Spherical, fit, job).run(emit),
         LobeKind::Planar => Fitter::new(Planar, fit, job).run(emit),
+        LobeKind::Peaks => peaks::fit_levels(fit.lobes, job, emit),
     }
 }
 

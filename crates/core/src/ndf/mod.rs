@@ -12,6 +12,7 @@ mod gmm;
 mod mixture;
 mod naive;
 mod ndm;
+mod phong;
 mod sh;
 mod slopes;
 mod toksvig;
@@ -25,6 +26,7 @@ pub use gmm::{GaussianMixture, Gmm};
 pub use mixture::{Lobes, Shaded};
 pub use naive::Naive;
 pub use ndm::{Kernel, Ndm, Normalisation};
+pub use phong::{Phong, PhongPeaks};
 pub use sh::{Coefficients, Sh};
 pub use slopes::{SlopeGaussian, SlopeMoments, Slopes};
 pub use toksvig::{Lobe, Toksvig};
@@ -99,6 +101,11 @@ pub trait Representation: Debug + Send + Sync {
         *sums
     }
 
+    /// False when channels of several texels must not be mixed, and each texel be shaded by itself.
+    fn filterable(&self) -> bool {
+        true
+    }
+
     /// True when [`Self::finish`] does something.
     fn has_finish(&self) -> bool {
         false
@@ -169,6 +176,8 @@ pub enum Decoded {
     Coefficients(Vec<f64>),
     /// Lobes on the sphere that are alive.
     Lobes(Vec<MixtureLobe>),
+    /// Phong peaks, the exponent of each one over its variance.
+    Peaks(Vec<MixtureLobe>),
     /// Lobes in the plane of `n.xy` that are alive.
     PlanarLobes(Vec<PlanarLobe>),
 }
@@ -252,6 +261,9 @@ pub trait Method: Debug + Send + Sync {
 
     /// A fitted lobe's sums as this method's channels.
     fn store_lobe(&self, sums: &Four) -> Four;
+
+    /// False when channels of several texels must not be mixed, and each texel be shaded by itself.
+    fn filterable(&self) -> bool;
 }
 
 impl<R: Representation> Method for R {
@@ -308,6 +320,10 @@ impl<R: Representation> Method for R {
     fn store_lobe(&self, sums: &Four) -> Four {
         Representation::store_lobe(self, sums)
     }
+
+    fn filterable(&self) -> bool {
+        Representation::filterable(self)
+    }
 }
 
 /// Reads what follows a method's name, split at colons; the error says what is wrong.
@@ -331,7 +347,7 @@ pub struct Row {
 
 /// Every representation there is.
 pub static TABLE: &[Row] =
-    &[fixed::ROW, naive::ROW, toksvig::ROW, ndm::ROW, slopes::ROW, sh::ROW, vmf::ROW, gmm::ROW];
+    &[fixed::ROW, naive::ROW, toksvig::ROW, ndm::ROW, slopes::ROW, sh::ROW, vmf::ROW, gmm::ROW, phong::ROW];
 
 /// A spelling that names no representation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

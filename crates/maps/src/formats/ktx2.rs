@@ -4,11 +4,14 @@
 //! never be in memory whole. Read by hand from its header, level index and key/value data: the crate's
 //! `Reader` panics on a hostile data format descriptor, which we do not need. `docs/formats.md` has the layout.
 
-use std::io::{Seek, SeekFrom, Write};
+use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use ::ktx2::dfd::{Basic, Block};
-use ::ktx2::{Format as VkFormat, Header as KtxHeader, Index, KeyValueDataIterator, LevelIndex, MAGIC};
+use ::ktx2::{
+    Format as VkFormat, Header as KtxHeader, Index, KeyValueDataIterator, LevelIndex, MAGIC,
+    SupercompressionScheme,
+};
 use ndfmap_core::bake::{LevelSink, Place};
 use ndfmap_core::grid::Size;
 use ndfmap_core::pyramid::{Layout, Precision, level_sizes};
@@ -48,6 +51,112 @@ fn key_value(key: &str, value: &str) -> Vec<u8> {
     entry
 }
 
+/// All of a file but its levels, and where those lie.
+struct Front {
+    bytes: Vec<u8>,
+    /// First byte of each level.
+    levels: Vec<u64>,
+    /// Length of the whole file.
+    length: u64,
+}
+
+impl Front {
+    /// For levels of these stored lengths, finest first.
+    fn new(
+        path: &Path,
+        header: &Header,
+        layout: Layout,
+        scheme: Option<SupercompressionScheme>,
+        stored: &[u64],
+    ) -> Result<Self, MapError> {
+        let sizes = level_sizes(layout.size);
+        let format = vk_format(layout.precision);
+        let (basic, type_size) =
+            Basic::from_format(format).map_err(|e| MapError::unsupported(path, format!("{e:?}")))?;
+        let block = Block::Basic(basic).to_vec();
+        let mut dfd = (block.len() as u32 + 4).to_le_bytes().to_vec();
+        dfd.extend_from_slice(&block);
+        // Keys in the order of their bytes, as the specification asks.
+        let mut kvd = key_value("KTXorientation", "rd");
+        kvd.extend(key_value("KTXwriter", concat!("ndfmap ", env!("CARGO_PKG_VERSION"))));
+        kvd.extend(key_value(KEY, &header.to_json()));
+        let dfd_start = KtxHeader::LENGTH + sizes.len() * LevelIndex::LENGTH;
+        let kvd_start = dfd_start + dfd.len();
+        // Levels lie smallest first, each aligned to its texel where it is not compressed.
+        let alignment = if scheme.is_none() { layout.precision.texel_bytes() as u64 } else { 1 };
+        let mut end = (kvd_start + kvd.len()) as u64;
+        let mut levels = vec![0; sizes.len()];
+        for (start, length) in levels.iter_mut().zip(stored).rev() {
+            *start = end.next_multiple_of(alignment);
+            end = *start + length;
+        }
+        let ktx = KtxHeader {
+            format: Some(format),
+            type_size,
+            pixel_width: layout.size.width as u32,
+            pixel_height: layout.size.height as u32,
+            pixel_depth: 0,
+            layer_count: layout.layers as u32,
+            face_count: 1,
+            level_count: sizes.len() as u32,
+            supercompression_scheme: scheme,
+            index: Index {
+                dfd_byte_offset: dfd_start as u32,
+                dfd_byte_length: dfd.len() as u32,
+                kvd_byte_offset: kvd_start as u32,
+                kvd_byte_length: kvd.len() as u32,
+                sgd_byte_offset: 0,
+                sgd_byte_length: 0,
+            },
+        };
+        let mut bytes = ktx.as_bytes().to_vec();
+        for ((byte_offset, byte_length), size) in levels.iter().zip(stored).zip(&sizes) {
+            let index = LevelIndex {
+                byte_offset: *byte_offset,
+                byte_length: *byte_length,
+                uncompressed_byte_length: level_bytes(&layout, *size),
+            };
+            bytes.extend_from_slice(&index.as_bytes());
+        }
+        bytes.extend(dfd);
+        bytes.extend(kvd);
+        Ok(Self { bytes, levels, length: end })
+    }
+}
+
+/// Bytes of all layers of a level.
+fn level_bytes(layout: &Layout, size: Size) -> u64 {
+    (layout.layer_bytes(size) * layout.layers) as u64
+}
+
+/// Writes a map with Zstandard supercompression, at a level from 1 (fast) to 22; returns the file's length.
+///
+/// Every compression level's bytes are the same for any number of threads: the library cuts its jobs by size.
+///
+/// # Errors
+/// [`MapError`] when the file cannot be written.
+pub fn write_compressed(path: &Path, map: &NdfMap, level: i32) -> Result<u64, MapError> {
+    let io = |e| MapError::io(path, e);
+    let p = &map.pyramid;
+    let layout =
+        Layout { size: p.sizes()[0], layers: p.layers(), precision: p.precision(), wraps: p.wraps() };
+    let mut compressor = zstd::bulk::Compressor::new(level).map_err(io)?;
+    compressor.multithread(rayon::current_num_threads().max(1) as u32).map_err(io)?;
+    let compressed: Result<Vec<Vec<u8>>, _> =
+        (0..p.sizes().len()).map(|level| compressor.compress(p.level_bytes(level))).collect();
+    let compressed = compressed.map_err(io)?;
+    let stored: Vec<u64> = compressed.iter().map(|c| c.len() as u64).collect();
+    let scheme = Some(SupercompressionScheme::Zstandard);
+    let front = Front::new(path, &map.header, layout, scheme, &stored)?;
+    let mut file = AtomicFile::create(path)?;
+    let mut write = |bytes: &[u8]| file.file().write_all(bytes).map_err(io);
+    write(&front.bytes)?;
+    compressed.iter().rev().try_for_each(|level| write(level))?;
+    file.file().flush().map_err(io)?;
+    file.finish()?;
+    Ok(front.length)
+}
+
 /// Writes a KTX2 file while its levels are being baked.
 #[derive(Debug)]
 pub struct Ktx2Sink {
@@ -65,57 +174,11 @@ impl Ktx2Sink {
     /// [`MapError`] when the file cannot be written.
     pub fn create(path: &Path, header: &Header, layout: Layout) -> Result<Self, MapError> {
         let sizes = level_sizes(layout.size);
-        let format = vk_format(layout.precision);
-        let (basic, type_size) =
-            Basic::from_format(format).map_err(|e| MapError::unsupported(path, format!("{e:?}")))?;
-        let block = Block::Basic(basic).to_vec();
-        let mut dfd = (block.len() as u32 + 4).to_le_bytes().to_vec();
-        dfd.extend_from_slice(&block);
-        // Keys in the order of their bytes, as the specification asks.
-        let mut kvd = key_value("KTXorientation", "rd");
-        kvd.extend(key_value("KTXwriter", concat!("ndfmap ", env!("CARGO_PKG_VERSION"))));
-        kvd.extend(key_value(KEY, &header.to_json()));
-        let dfd_start = KtxHeader::LENGTH + sizes.len() * LevelIndex::LENGTH;
-        let kvd_start = dfd_start + dfd.len();
-        // Levels lie smallest first, each aligned to its texel.
-        let mut end = (kvd_start + kvd.len()) as u64;
-        let mut levels = Vec::with_capacity(sizes.len());
-        for size in sizes.iter().rev() {
-            let start = end.next_multiple_of(layout.precision.texel_bytes() as u64);
-            levels.push((*size, start));
-            end = start + (layout.layer_bytes(*size) * layout.layers) as u64;
-        }
-        levels.reverse();
-        let ktx = KtxHeader {
-            format: Some(format),
-            type_size,
-            pixel_width: layout.size.width as u32,
-            pixel_height: layout.size.height as u32,
-            pixel_depth: 0,
-            layer_count: layout.layers as u32,
-            face_count: 1,
-            level_count: sizes.len() as u32,
-            supercompression_scheme: None,
-            index: Index {
-                dfd_byte_offset: dfd_start as u32,
-                dfd_byte_length: dfd.len() as u32,
-                kvd_byte_offset: kvd_start as u32,
-                kvd_byte_length: kvd.len() as u32,
-                sgd_byte_offset: 0,
-                sgd_byte_length: 0,
-            },
-        };
-        let mut start = ktx.as_bytes().to_vec();
-        for (size, byte_offset) in &levels {
-            let byte_length = (layout.layer_bytes(*size) * layout.layers) as u64;
-            let index =
-                LevelIndex { byte_offset: *byte_offset, byte_length, uncompressed_byte_length: byte_length };
-            start.extend_from_slice(&index.as_bytes());
-        }
-        start.extend(dfd);
-        start.extend(kvd);
-        let mut sink = Self { file: AtomicFile::create(path)?, layout, levels, length: end };
-        sink.write_at(0, &start)?;
+        let stored: Vec<u64> = sizes.iter().map(|size| level_bytes(&layout, *size)).collect();
+        let front = Front::new(path, header, layout, None, &stored)?;
+        let levels = sizes.into_iter().zip(front.levels).collect();
+        let mut sink = Self { file: AtomicFile::create(path)?, layout, levels, length: front.length };
+        sink.write_at(0, &front.bytes)?;
         Ok(sink)
     }
 
@@ -148,6 +211,20 @@ impl LevelSink for Ktx2Sink {
     }
 }
 
+/// The most that a byte of Zstandard can stand for: a block of 128 KiB of one value takes four.
+const MOST_PER_BYTE: u64 = 32_768;
+
+/// Decompresses a level that must be `expected` bytes long; memory grows only as bytes come out.
+fn inflate(stored: &[u8], expected: u64) -> Result<Vec<u8>, String> {
+    if expected / MOST_PER_BYTE > stored.len() as u64 {
+        return Err(format!("{} bytes cannot hold {expected}", stored.len()));
+    }
+    let decoder = zstd::Decoder::new(stored).map_err(|e| e.to_string())?;
+    let mut bytes = Vec::new();
+    decoder.take(expected + 1).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
+    if bytes.len() as u64 == expected { Ok(bytes) } else { Err(format!("it does not hold {expected} bytes")) }
+}
+
 /// Reads a baked map; a sound KTX2 file without our key is an error that says so.
 fn read_ndf(path: &Path, bytes: &[u8]) -> Result<Option<NdfMap>, MapError> {
     let invalid = |reason: String| MapError::invalid(path, reason);
@@ -170,12 +247,14 @@ fn read_ndf(path: &Path, bytes: &[u8]) -> Result<Option<NdfMap>, MapError> {
     let text =
         std::str::from_utf8(text).map_err(|e| invalid(format!("has a key `{KEY}` that is no text: {e}")))?;
     let header = Header::from_json(path, text.trim_end_matches('\0'))?;
-    if let Some(scheme) = ktx.supercompression_scheme {
-        return Err(MapError::unsupported(
-            path,
-            format!("is supercompressed ({scheme:?}); plain KTX2 is read"),
-        ));
-    }
+    let compressed = match ktx.supercompression_scheme {
+        None => false,
+        Some(SupercompressionScheme::Zstandard) => true,
+        Some(other) => {
+            let reason = format!("is supercompressed ({other:?}); plain KTX2 and Zstandard are read");
+            return Err(MapError::unsupported(path, reason));
+        }
+    };
     let precision = match ktx.format {
         Some(VkFormat::R16G16B16A16_SFLOAT) => Precision::Half,
         Some(VkFormat::R32G32B32A32_SFLOAT) => Precision::Single,
@@ -207,14 +286,17 @@ fn read_ndf(path: &Path, bytes: &[u8]) -> Result<Option<NdfMap>, MapError> {
         let index: &[u8; LevelIndex::LENGTH] =
             slice(at, LevelIndex::LENGTH as u64).and_then(|s| s.first_chunk()).ok_or_else(truncated)?;
         let index = LevelIndex::from_bytes(index);
-        let expected = (layout.layer_bytes(*size) * layout.layers) as u64;
-        if index.byte_length != expected {
-            return Err(invalid(format!(
-                "has {} bytes in level {level}, where {expected} are due",
-                index.byte_length
-            )));
+        let expected = level_bytes(&layout, *size);
+        let claimed = if compressed { index.uncompressed_byte_length } else { index.byte_length };
+        if claimed != expected {
+            return Err(invalid(format!("has {claimed} bytes in level {level}, where {expected} are due")));
         }
-        levels.push(slice(index.byte_offset, expected).ok_or_else(truncated)?.to_vec());
+        let stored = slice(index.byte_offset, index.byte_length).ok_or_else(truncated)?;
+        levels.push(if compressed {
+            inflate(stored, expected).map_err(|why| invalid(format!("has a damaged level {level}: {why}")))?
+        } else {
+            stored.to_vec()
+        });
     }
     NdfMap::assemble(path, header, precision, levels).map(Some)
 }

@@ -132,6 +132,13 @@ fn describe(decoded: Decoded) -> Value {
             };
             json!({ "lobes": lobes.iter().map(lobe).collect::<Vec<_>>() })
         }
+        Decoded::Peaks(peaks) => {
+            let peak = |p: &MixtureLobe| {
+                let exponent = p.variance.recip().min(MOST_KAPPA);
+                json!({ "layer": p.layer, "weight": p.weight, "mean": p.mean.to_array(), "exponent": exponent })
+            };
+            json!({ "peaks": peaks.iter().map(peak).collect::<Vec<_>>() })
+        }
         Decoded::PlanarLobes(lobes) => {
             let lobe = |l: &PlanarLobe| json!({ "layer": l.layer, "weight": l.weight, "mean": l.mean.to_array(), "variance": l.variance });
             json!({ "lobes": lobes.iter().map(lobe).collect::<Vec<_>>() })

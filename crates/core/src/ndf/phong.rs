@@ -1,0 +1,138 @@
+//! `phong:J`: a few Phong peaks a texel, by non-linear least squares. Fournier 1992; a baseline in Tan et al. 2005.
+//!
+//! A peak holds its weight, direction and exponent. None of these mixes: a filter shades every peak of every texel it
+//! reads, up to 8 J of them, and blends the results (`filtering.rs`). A peak of exponent s is the BRDF widened by `1/s`.
+
+use glam::DVec3;
+
+use super::mixture::{Lobes, MixtureEvaluator, Shaded};
+use super::{Decoded, Evaluator, Method, MixtureLobe, Representation, Row, Sample};
+use crate::brdf::Brdf;
+use crate::fit::{Alignment, Fit, Four, LobeKind, MAX_LOBES, SHARPEST};
+use crate::units::SlopeVariance;
+
+/// Phong peaks.
+#[derive(Clone, Copy, Debug)]
+pub struct Phong {
+    peaks: usize,
+}
+
+pub(super) const ROW: Row = Row {
+    name: "phong",
+    parameters: ":J",
+    summary: "J = 1..8 Phong peaks by least squares; not filterable, every texel's peaks are shaded",
+    paper: "Fournier 1992; baseline of Tan et al. 2005",
+    parse,
+    samples: &["phong:4", "phong:1"],
+};
+
+fn parse(words: &[&str]) -> Result<Box<dyn Method>, String> {
+    match words {
+        [peaks] => peaks.parse().ok().filter(|n| (1..=MAX_LOBES).contains(n)),
+        _ => None,
+    }
+    .map(|peaks| Box::new(Phong { peaks }) as Box<dyn Method>)
+    .ok_or_else(|| {
+        format!("the number of peaks must be a whole number from 1 to {MAX_LOBES}, as in `phong:4`")
+    })
+}
+
+/// The peaks of a texel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhongPeaks {
+    /// Peaks of any weight.
+    pub peaks: Vec<Shaded>,
+}
+
+impl From<PhongPeaks> for Decoded {
+    fn from(peaks: PhongPeaks) -> Self {
+        let peak = |p: &Shaded| MixtureLobe {
+            layer: p.layer,
+            weight: p.weight,
+            mean: p.mean,
+            variance: p.variance.get(),
+        };
+        Self::Peaks(peaks.peaks.iter().map(peak).collect())
+    }
+}
+
+impl Phong {
+    fn peaks(sums: &Lobes) -> Vec<Shaded> {
+        let peak = |(layer, &[weight, x, y, exponent]): (usize, &Four)| {
+            // Held to the disk and to exponents that mean something, whatever a damaged file holds.
+            let (x, y) = (f64::from(x), f64::from(y));
+            let held = x.hypot(y).max(1.0);
+            let (x, y) = (x / held, y / held);
+            let mean = DVec3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt());
+            let variance =
+                if exponent < SHARPEST * 0.999 { 1.0 / f64::from(exponent.max(1e-2)) } else { 0.0 };
+            Shaded { layer, weight: f64::from(weight), mean, variance: SlopeVariance::clamped(variance) }
+        };
+        sums.alive().map(peak).collect()
+    }
+}
+
+impl Representation for Phong {
+    type Sums = Lobes;
+    type Lobes = PhongPeaks;
+
+    fn spelling(&self) -> String {
+        format!("{}:{}", ROW.name, self.peaks)
+    }
+
+    fn layers(&self) -> usize {
+        self.peaks
+    }
+
+    fn encoding(&self) -> &'static str {
+        "peaks"
+    }
+
+    fn zero(&self) -> Lobes {
+        Lobes::zero(self.peaks)
+    }
+
+    /// A normal is one sharp peak; several do not add up to anything.
+    fn accumulate(&self, sums: &mut Lobes, sample: &Sample, weight: f32) {
+        sums.add(0, [1.0, sample.normal.x, sample.normal.y, SHARPEST], weight);
+    }
+
+    fn blend(&self, sums: &mut Lobes, part: &Lobes, weight: f32) {
+        sums.blend(part, weight);
+    }
+
+    fn pack(&self, sums: &Lobes, channels: &mut [f32]) {
+        channels.as_chunks_mut().0.iter_mut().zip(sums.all()).for_each(|(rgba, peak)| *rgba = *peak);
+    }
+
+    fn unpack(&self, channels: &[f32]) -> Lobes {
+        let mut sums = self.zero();
+        for (j, rgba) in channels.as_chunks().0.iter().take(self.peaks.min(MAX_LOBES)).enumerate() {
+            sums.add(j, *rgba, 1.0);
+        }
+        sums
+    }
+
+    fn decode(&self, sums: &Lobes) -> PhongPeaks {
+        PhongPeaks { peaks: Self::peaks(sums) }
+    }
+
+    fn effective<'a>(&'a self, peaks: &PhongPeaks, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+        let widened: Vec<(f64, DVec3, Box<dyn Brdf>)> =
+            peaks.peaks.iter().map(|p| (p.weight, p.mean, brdf.widen(p.variance))).collect();
+        Box::new(move |w| widened.iter().map(|(weight, mu, lobe)| weight * lobe.evaluate(w.dot(*mu))).sum())
+    }
+
+    fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
+        let lobes = |channels: &[f32]| Self::peaks(&self.unpack(channels));
+        Box::new(MixtureEvaluator { lobes, cosine: |w: DVec3, mu: DVec3| w.dot(mu), brdf, directions })
+    }
+
+    fn fit(&self) -> Option<Fit> {
+        Some(Fit { kind: LobeKind::Peaks, lobes: self.peaks, alignment: Alignment::Unaligned })
+    }
+
+    fn filterable(&self) -> bool {
+        false
+    }
+}
