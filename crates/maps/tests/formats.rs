@@ -12,7 +12,7 @@ use ndfmap_core::grid::Size;
 use ndfmap_core::pyramid::{Layout, Precision};
 use ndfmap_core::surface::{Surface, SurfaceRow};
 use ndfmap_maps::formats::exr::{write_bumpslopes, write_native};
-use ndfmap_maps::formats::ktx2::Ktx2Sink;
+use ndfmap_maps::formats::ktx2::{Ktx2Sink, write_compressed};
 use ndfmap_maps::formats::{read_file, read_image, read_ndf};
 use ndfmap_maps::source::{SourceMap, SourceOptions, read_source, source_of_image};
 use ndfmap_maps::{NdfMap, SourceKind};
@@ -144,18 +144,33 @@ fn baked_maps_come_back_bit_for_bit() {
     for method in ndfmap_core::ndf::TABLE.iter().map(|row| row.samples[0]) {
         for precision in [Precision::Half, Precision::Single] {
             let map = baked(method, "foil", precision);
-            for name in ["map.ktx2", "map.exr"] {
+            for name in ["map.ktx2", "small.ktx2", "map.exr"] {
                 let path = folder.path().join(name);
-                if name.ends_with("ktx2") {
-                    write_ktx2(&path, &map)
-                } else {
-                    assert!(write_native(&path, &map).unwrap() > 0)
+                match name {
+                    "map.ktx2" => write_ktx2(&path, &map),
+                    "small.ktx2" => {
+                        let length = write_compressed(&path, &map, 5).unwrap();
+                        assert_eq!(length, std::fs::metadata(&path).unwrap().len());
+                    }
+                    _ => assert!(write_native(&path, &map).unwrap() > 0),
                 }
                 let back = read_ndf(&path, &read_file(&path).unwrap()).unwrap().unwrap();
                 assert!(back == map, "{method} {precision:?} {name}");
             }
         }
     }
+}
+
+#[test]
+fn attributes_that_do_not_fit_the_method_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.ktx2");
+    let mut map = baked("slopes", "foil", Precision::Half);
+    map.header.attributes =
+        vec![ndfmap_maps::Attribute { name: "a.png".to_owned(), channels: 1, transfer: "linear".to_owned() }];
+    write_compressed(&path, &map, 1).unwrap();
+    let error = read_ndf(&path, &read_file(&path).unwrap()).unwrap_err().to_string();
+    assert!(error.ends_with("says that `slopes` carries 1 attributes"), "{error}");
 }
 
 #[test]

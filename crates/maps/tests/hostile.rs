@@ -11,6 +11,7 @@ use std::path::Path;
 use common::{baked, pictures};
 use ndfmap_core::pyramid::Precision;
 use ndfmap_maps::formats::exr::{write_bumpslopes, write_native};
+use ndfmap_maps::formats::ktx2::write_compressed;
 use ndfmap_maps::formats::{read_image, read_ndf};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -26,6 +27,9 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
     write_bumpslopes(&path, &map, map.pyramid.precision()).unwrap();
     all.push(("bumpslopes.exr", std::fs::read(&path).unwrap()));
     all.push(("map.ktx2", ktx2()));
+    let path = folder.path().join("small.ktx2");
+    write_compressed(&path, &baked("vmf:2", "armour", Precision::Half), 3).unwrap();
+    all.push(("zstd.ktx2", std::fs::read(&path).unwrap()));
     all
 }
 

@@ -6,6 +6,7 @@
 pub use ndfmap_core as core;
 pub use ndfmap_maps as maps;
 
+mod auto;
 pub mod commands;
 mod fail;
 mod interrupt;

@@ -5,6 +5,7 @@ use std::time::Instant;
 use ndfmap_core::bake::Bake;
 use ndfmap_core::brdf::Brdf;
 use ndfmap_core::error::{Truth, lattice_for, level_error, true_levels};
+use ndfmap_core::filtering::{FilteringError, filtering_error, true_corners};
 use ndfmap_core::grid::Size;
 use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid::{Precision, Pyramid, level_sizes};
@@ -19,6 +20,8 @@ pub(crate) struct Subject<'a> {
     pub(crate) brdf: &'a dyn Brdf,
     pub(crate) methods: &'a [Box<dyn Method>],
     pub(crate) precision: Precision,
+    /// Measure between texels too.
+    pub(crate) filtering: bool,
 }
 
 /// One method's map and its errors.
@@ -29,6 +32,8 @@ pub(crate) struct Row {
     pub(crate) pyramid: Pyramid,
     /// One a level, finest first.
     pub(crate) errors: Vec<f64>,
+    /// Between texels, where asked for.
+    pub(crate) filtering: Vec<FilteringError>,
 }
 
 /// Everything that was measured.
@@ -41,10 +46,20 @@ pub(crate) struct Comparison {
 /// Bakes and measures.
 pub(crate) fn compare(subject: &Subject<'_>) -> Comparison {
     let lattice = lattice_for(subject.brdf);
-    let truths = {
+    let sizes = level_sizes(subject.surface.size());
+    let (truths, corners) = {
         let progress = Progress::new("truth");
         let truth = Truth::new(subject.surface, subject.brdf, &lattice);
-        true_levels(&truth, &|f| progress.set(f))
+        let part = if subject.filtering { 0.5 } else { 1.0 };
+        let truths = true_levels(&truth, &|f| progress.set(part * f));
+        // Level 0 is the map itself, filtered as it has always been.
+        let levels: Vec<usize> = if subject.filtering { (1..sizes.len()).collect() } else { Vec::new() };
+        (
+            truths,
+            true_corners(&truth, subject.surface.wraps(), &levels, &|f| {
+                progress.set(part + (1.0 - part) * f)
+            }),
+        )
     };
     let mut rows = Vec::new();
     for method in subject.methods {
@@ -60,10 +75,19 @@ pub(crate) fn compare(subject: &Subject<'_>) -> Comparison {
         let bake_seconds = start.elapsed().as_secs_f64();
         let error = |truth| level_error(&pyramid, &**method, subject.brdf, &lattice, truth);
         let errors = truths.iter().map(error).collect();
+        let between = |truth| filtering_error(&pyramid, &**method, subject.brdf, &lattice, truth);
+        let filtering = corners.iter().map(between).collect();
         let bytes_per_texel = method.layers() * subject.precision.texel_bytes();
-        rows.push(Row { method: method.spelling(), bytes_per_texel, bake_seconds, pyramid, errors });
+        rows.push(Row {
+            method: method.spelling(),
+            bytes_per_texel,
+            bake_seconds,
+            pyramid,
+            errors,
+            filtering,
+        });
     }
-    Comparison { brdf: subject.brdf.spelling(), sizes: level_sizes(subject.surface.size()), rows }
+    Comparison { brdf: subject.brdf.spelling(), sizes, rows }
 }
 
 impl Comparison {
@@ -75,11 +99,17 @@ impl Comparison {
             .map(|row| {
                 let level = |(level, error): (usize, &f64)| json!({ "level": level, "error": error });
                 let levels: Vec<Value> = row.errors.iter().enumerate().map(level).collect();
-                let value = json!({
+                let mut value = json!({
                     "bytes_per_texel": row.bytes_per_texel,
                     "bake_seconds": row.bake_seconds,
                     "levels": levels,
                 });
+                if !row.filtering.is_empty() {
+                    let level = |e: &FilteringError| {
+                        json!({ "level": e.level, "texels": e.texels, "between": e.filtered, "reference": e.reference })
+                    };
+                    value["filtering"] = row.filtering.iter().map(level).collect();
+                }
                 (row.method.clone(), value)
             })
             .collect();
@@ -120,6 +150,21 @@ impl Comparison {
                 text += &format!(" {:>6}", three_digits(*error));
             }
             text.push('\n');
+        }
+        if self.rows.iter().any(|row| !row.filtering.is_empty()) {
+            text += "\nbetween texels (edges and corners): filtered, then by the reference path that shades every neighbour\n\n";
+            for row in &self.rows {
+                for (what, error) in [
+                    ("filtered", (|e| e.filtered) as fn(&FilteringError) -> f64),
+                    ("reference", |e| e.reference),
+                ] {
+                    text += &format!("{:name$} {what:>15}       -", row.method);
+                    for e in &row.filtering {
+                        text += &format!(" {:>6}", three_digits(error(e)));
+                    }
+                    text.push('\n');
+                }
+            }
         }
         text
     }

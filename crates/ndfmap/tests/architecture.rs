@@ -55,8 +55,19 @@ fn core_opens_no_file_device_or_window() {
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     let found: BTreeSet<&str> =
         text.lines().filter_map(|l| l.split(' ').next()).filter(|n| *n != "ndfmap-core").collect();
-    let allowed =
-        ["bytemuck", "fearless_simd", "glam", "half", "libm", "rand", "rand_pcg", "rayon", "thiserror"];
+    let allowed = [
+        "bytemuck",
+        "fearless_simd",
+        "glam",
+        "half",
+        "levenberg-marquardt",
+        "libm",
+        "nalgebra",
+        "rand",
+        "rand_pcg",
+        "rayon",
+        "thiserror",
+    ];
     assert_eq!(found, allowed.into_iter().collect());
 }
 

@@ -31,6 +31,10 @@ fn bake_then_inspect_every_method() {
         ("ndm:pearson:integrated", 3, "covariance"),
         ("slopes", 2, "height"),
         ("sh:3", 4, "coefficients"),
+        ("vmf:4", 4, "lobes"),
+        ("vmf:2:unaligned:origin", 2, "lobes"),
+        ("gmm:3:prior", 3, "lobes"),
+        ("phong:2", 2, "peaks"),
     ] {
         for extension in ["ktx2", "exr"] {
             let file = text(&folder.path().join(format!("map.{extension}")));
@@ -60,6 +64,155 @@ fn bake_then_inspect_every_method() {
 }
 
 #[test]
+fn lobes_are_described_in_full() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = text(&folder.path().join("map.ktx2"));
+    let texel = |method: &str| {
+        json(&["bake", "builtin:foil", "--size", "64", "-m", method, "-o", &file, "--json"]);
+        json(&["inspect", &file, "--json", "--texel", "4", "1", "2"])
+    };
+    for (method, mean, width) in [("vmf:4", 3, "kappa"), ("gmm:4", 2, "variance")] {
+        let told = texel(method);
+        let lobes = told["lobes"].as_array().unwrap();
+        let weights: f64 = lobes.iter().map(|l| l["weight"].as_f64().unwrap()).sum();
+        assert!((weights - 1.0).abs() < 1e-9 && !lobes.is_empty(), "{told}");
+        for lobe in lobes {
+            assert_eq!(lobe["mean"].as_array().unwrap().len(), mean);
+            assert!(lobe[width].as_f64().unwrap() > 0.0);
+        }
+    }
+    let told = texel("phong:3");
+    assert!(
+        told["peaks"].as_array().unwrap().iter().all(|p| p["exponent"].as_f64().unwrap() > 0.0),
+        "{told}"
+    );
+}
+
+/// An 8-bit picture of this size.
+fn picture(
+    path: &str,
+    channels: png::ColorType,
+    width: u32,
+    height: u32,
+    texel: impl Fn(u32, u32) -> Vec<u8>,
+) {
+    let mut encoder = png::Encoder::new(std::fs::File::create(path).unwrap(), width, height);
+    encoder.set_color(channels);
+    let data: Vec<u8> =
+        (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).flat_map(|(x, y)| texel(x, y)).collect();
+    encoder.write_header().unwrap().write_image_data(&data).unwrap();
+}
+
+#[test]
+fn attributes_stay_with_their_lobes() {
+    // Left-facing texels are red, right-facing ones green, in a checkerboard: the coarsest texel has two lobes, each of
+    // its own colour, where an average would be brown.
+    let folder = tempfile::tempdir().unwrap();
+    let [normal, albedo, gloss, small, file] =
+        ["n.png", "a.png", "g.png", "s.png", "map.ktx2"].map(|n| text(&folder.path().join(n)));
+    let left = |x: u32, y: u32| (x + y).is_multiple_of(2);
+    picture(&normal, png::ColorType::Rgb, 16, 16, |x, y| vec![if left(x, y) { 68 } else { 188 }, 128, 240]);
+    picture(
+        &albedo,
+        png::ColorType::Rgb,
+        16,
+        16,
+        |x, y| if left(x, y) { vec![188, 0, 0] } else { vec![0, 188, 0] },
+    );
+    picture(&gloss, png::ColorType::Grayscale, 16, 16, |x, y| vec![if left(x, y) { 51 } else { 204 }]);
+    picture(&small, png::ColorType::Grayscale, 8, 16, |_, _| vec![0]);
+    for (zstd, method) in [(false, "vmf:2"), (true, "gmm:2")] {
+        let srgb = format!("srgb:{albedo}");
+        let mut words = vec![
+            "bake",
+            &normal,
+            "-o",
+            &file,
+            "-m",
+            method,
+            "--attribute",
+            &srgb,
+            "--attribute",
+            &gloss,
+            "--json",
+        ];
+        words.extend(zstd.then_some("--zstd"));
+        assert_eq!(json(&words)["layers"], 6);
+        let told = json(&["inspect", &file, "--json"]);
+        assert_eq!(
+            told["attributes"][0],
+            serde_json::json!({ "name": "a.png", "channels": 3, "transfer": "srgb" })
+        );
+        for level in ["0", "2", "4"] {
+            let texel = json(&["inspect", &file, "--json", "--texel", level, "0", "0"]);
+            for lobe in texel["lobes"].as_array().unwrap() {
+                let is_left = lobe["mean"][0].as_f64().unwrap() < 0.0;
+                let values = |name: &str| {
+                    let all = lobe["attributes"][name].as_array().unwrap();
+                    all.iter().map(|v| v.as_f64().unwrap()).collect::<Vec<_>>()
+                };
+                let (colour, gloss) = (values("a.png"), values("g.png"));
+                // sRGB 188 is 0.5029 in linear light; half floats hold it, and its weight, to 5e-4 each.
+                let expected = if is_left { [0.5029, 0.0, 0.0] } else { [0.0, 0.5029, 0.0] };
+                assert!(colour.iter().zip(expected).all(|(c, e)| (c - e).abs() < 2e-3), "{texel}");
+                assert!(
+                    gloss.len() == 1 && (gloss[0] - if is_left { 0.2 } else { 0.8 }).abs() < 2e-3,
+                    "{texel}"
+                );
+            }
+        }
+    }
+    let (status, _, said) = outcome(&["bake", &normal, "-o", &file, "-m", "vmf:2", "--attribute", &small]);
+    assert!(status == 1 && said.contains("must be as large as the map, 16 × 16"), "{said}");
+    for method in ["slopes", "phong:2"] {
+        let (status, _, said) = outcome(&["bake", &normal, "-o", &file, "-m", method, "--attribute", &gloss]);
+        assert!(status == 2 && said.contains("no lobes that carry attributes"), "{said}");
+    }
+}
+
+#[test]
+fn zstandard_makes_the_same_map_smaller() {
+    let folder = tempfile::tempdir().unwrap();
+    let [plain, small] = ["plain.ktx2", "small.ktx2"].map(|n| text(&folder.path().join(n)));
+    let bake = |file: &str, more: &[&str]| {
+        let words = ["bake", "builtin:dunes", "--size", "96x33", "-m", "vmf:3", "-o", file, "--json"];
+        json(&[&words[..], more].concat())["bytes"].as_u64().unwrap()
+    };
+    let (long, short) = (bake(&plain, &[]), bake(&small, &["--zstd", "9"]));
+    assert!(short < long, "{short} {long}");
+    assert_eq!(short, std::fs::metadata(&small).unwrap().len());
+    for level in ["0", "3"] {
+        let texel = |file: &str| json(&["inspect", file, "--json", "--texel", level, "2", "1"]);
+        assert_eq!(texel(&plain), texel(&small));
+    }
+    let bytes = |threads: &str| {
+        bake(&small, &["--zstd", "--threads", threads]);
+        std::fs::read(&small).unwrap()
+    };
+    assert!(bytes("1") == bytes("2") && bytes("1") == bytes("8"));
+}
+
+#[test]
+fn auto_chooses_by_measuring_and_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = text(&folder.path().join("map.ktx2"));
+    let base = ["bake", "builtin:foil", "--size", "64", "-m", "auto", "-o", &file];
+    let chosen = json(&[&base[..], &["--bytes-per-texel", "24", "--json"]].concat());
+    assert!(chosen["layers"].as_u64().unwrap() <= 3);
+    let candidates = chosen["auto"]["candidates"].as_array().unwrap();
+    let least = candidates.iter().map(|c| c["error"].as_f64().unwrap()).fold(f64::INFINITY, f64::min);
+    let own = candidates.iter().find(|c| c["method"] == chosen["method"]).unwrap();
+    assert_eq!(own["error"].as_f64().unwrap(), least);
+    assert!(candidates.iter().all(|c| c["bytes_per_texel"].as_u64().unwrap() <= 24));
+    assert!(chosen["auto"]["why"].as_str().unwrap().contains("within 24 bytes"));
+    assert_eq!(json(&["inspect", &file, "--json"])["method"], chosen["method"]);
+    let (status, _, said) = outcome(&[&base[..], &["--max-error", "1e-9"]].concat());
+    assert!(status == 1 && said.contains("no method's error is at most"), "{said}");
+    let (status, _, said) = outcome(&[&base[..], &["--bytes-per-texel", "4"]].concat());
+    assert!(status == 1 && said.contains("no method takes at most 4 bytes"), "{said}");
+}
+
+#[test]
 fn compare_prints_one_document_and_a_report_stands_alone() {
     let folder = tempfile::tempdir().unwrap();
     let report = text(&folder.path().join("report"));
@@ -79,6 +232,7 @@ fn compare_prints_one_document_and_a_report_stands_alone() {
         |method: &str, level: usize| compared["methods"][method]["levels"][level]["error"].as_f64().unwrap();
     assert_eq!(compared["methods"]["slopes"]["bytes_per_texel"], 16);
     assert_eq!(compared["methods"]["naive"]["levels"].as_array().unwrap().len(), 7);
+    assert!(compared["methods"]["naive"]["filtering"].is_null());
     // What the project exists for: keeping the spread beats forgetting it.
     assert!(error("toksvig", 5) < 0.5 * error("naive", 5));
     let page = std::fs::read_to_string(Path::new(&report).join("report.html")).unwrap();
@@ -101,6 +255,27 @@ fn compare_prints_one_document_and_a_report_stands_alone() {
 }
 
 #[test]
+fn filtering_is_measured_and_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = text(&folder.path().join("report"));
+    let words =
+        ["compare", "builtin:foil", "--size", "64", "--methods", "toksvig,vmf:4,vmf:4:unaligned,phong:2"];
+    let told = json(&[&words[..], &["--filtering", "--report", &report, "--json"]].concat());
+    let at = |method: &str, key: &str| told["methods"][method]["filtering"][2][key].as_f64().unwrap();
+    // Level 0 is the map itself, and one texel has nothing between.
+    assert_eq!(told["methods"]["toksvig"]["filtering"].as_array().unwrap().len(), 5);
+    assert_eq!(told["methods"]["toksvig"]["filtering"][2]["level"], 3);
+    assert!(at("vmf:4", "between") < at("vmf:4:unaligned", "between"));
+    // What cannot be filtered is shaded texel by texel.
+    assert_eq!(at("phong:2", "between"), at("phong:2", "reference"));
+    assert!(Path::new(&report).join("alignment.png").exists());
+    let page = std::fs::read_to_string(Path::new(&report).join("report.html")).unwrap();
+    assert!(page.contains("Between texels") && page.contains("corner between four texels"));
+    let (_, table, _) = outcome(&[&words[..], &["--filtering"]].concat());
+    assert!(table.contains("reference"), "{table}");
+}
+
+#[test]
 fn demo_needs_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let output = text(&folder.path().join("demo"));
@@ -116,7 +291,7 @@ fn demo_needs_nothing() {
 #[test]
 fn the_same_file_for_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
-    let bake = |threads: &str, name: &str| {
+    let bake = |threads: &str, name: &str, method: &str| {
         let file = text(&folder.path().join(name));
         json(&[
             "bake",
@@ -124,7 +299,7 @@ fn the_same_file_for_any_number_of_threads() {
             "--size",
             "211x130",
             "-m",
-            "ndm",
+            method,
             "-o",
             &file,
             "--threads",
@@ -134,8 +309,11 @@ fn the_same_file_for_any_number_of_threads() {
         std::fs::read(file).unwrap()
     };
     for extension in ["ktx2", "exr"] {
-        let one = bake("1", &format!("1.{extension}"));
-        assert!(one == bake("2", &format!("2.{extension}")) && one == bake("8", &format!("8.{extension}")));
+        for method in ["ndm", "vmf:4", "gmm:4:prior"] {
+            let one = bake("1", &format!("1.{extension}"), method);
+            let more = |threads: &str| bake(threads, &format!("{threads}.{extension}"), method);
+            assert!(one == more("2") && one == more("8"), "{method}");
+        }
     }
 }
 
@@ -169,6 +347,20 @@ fn wrong_usage_is_2_and_suggests() {
         (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--wrap", "mirror"], "neither `repeat` nor `clamp`"),
         (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--size", "0"], "no side from 1"),
         (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--threads", "0"], "threads"),
+        (vec!["bake", "builtin:foil", "-o", "a.ktx2", "-m", "vmf:9"], "whole number from 1 to 8"),
+        (
+            vec!["bake", "builtin:foil", "-o", "a.ktx2", "-m", "vmf:4:sorted"],
+            "no alignment; there are refined",
+        ),
+        (vec!["bake", "builtin:foil", "-o", "a.ktx2", "-m", "phong"], "number of peaks"),
+        (vec!["bake", "builtin:foil", "-o", "a.ktx2", "-m", "auto"], "needs `--max-error E`"),
+        (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--max-error", "0.1"], "are for `--method auto`"),
+        (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--zstd", "23"], "--zstd"),
+        (vec!["bake", "builtin:foil", "-o", "a.exr", "--zstd"], "is for KTX2"),
+        (
+            vec!["bake", "builtin:foil", "-o", "a.ktx2", "-m", "vmf:2", "--attribute", "srgb:"],
+            "names no file",
+        ),
         (vec!["compare", "builtin:foil", "--brdf", "gxx:0.2"], "did you mean `ggx`"),
         (vec!["compare", "builtin:foil", "--brdf", "ggx:7"], "between 0.0001 and 1"),
         (vec!["inspect", "builtin:foil", "--texel", "0", "0", "0"], "no baked map"),

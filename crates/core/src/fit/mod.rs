@@ -128,15 +128,19 @@ const STARTS: usize = 16;
 const START_ROUNDS: usize = 5;
 
 /// Rounds of EM before refinement, and of refinement for each lobe.
-const ROUNDS_BEFORE: usize = 6;
+const ROUNDS_BEFORE: usize = 4;
 const REFINE_ROUNDS_PER_LOBE: usize = 4;
 
 /// Levels finer than this hold few normals a texel, which EM meets exactly or nearly: they are refined less or not at all.
 const FIRST_REFINED: usize = 2;
 const FIRST_REFINED_WELL: usize = 3;
 
+/// Rounds of EM, and of refinement, below [`FIRST_REFINED_WELL`].
+const FINE_ROUNDS: usize = 1;
+const FINE_REFINE_ROUNDS: usize = 4;
+
 /// Rows of the finest level made at a time.
-const BAND: usize = 64;
+const BAND: usize = 16;
 
 /// A lobe of less weight dies: half floats could no longer hold it.
 const LEAST_WEIGHT: f32 = 1.0 / 8192.0;
@@ -178,6 +182,11 @@ struct Level {
 }
 
 impl Level {
+    /// The texel that covers the middle of texel `(x, y)` of a level of `finer` size.
+    fn index_over(&self, finer: Size, (x, y): (usize, usize)) -> usize {
+        over(y, finer.height, self.size.height) * self.size.width + over(x, finer.width, self.size.width)
+    }
+
     /// The lobes of the texel that covers the middle of texel `(x, y)` of a level of `finer` size.
     fn over(&self, finer: Size, lobes: usize, (x, y): (usize, usize)) -> &[Four] {
         let up = |i: usize, fine: usize, coarse: usize| ((2 * i + 1) * coarse / (2 * fine)).min(coarse - 1);
@@ -185,6 +194,17 @@ impl Level {
             up(y, finer.height, self.size.height) * self.size.width + up(x, finer.width, self.size.width);
         &self.sums[at * lobes..][..lobes]
     }
+
+    /// `theta` of every lobe of some rows, in place of their sums: what is asked of a parent by several children.
+    fn thetas(&self, family: impl Family, lobes: usize, rows: Range<usize>) -> Vec<Four> {
+        let line = self.size.width * lobes;
+        self.sums[rows.start * line..rows.end * line].par_iter().map(|sums| family.natural(sums)).collect()
+    }
+}
+
+/// The texel of a coarser side that covers the middle of texel `i` of a finer one.
+fn over(i: usize, finer: usize, coarser: usize) -> usize {
+    ((2 * i + 1) * coarser / (2 * finer)).min(coarser - 1)
 }
 
 impl<'a, F: Family> Fitter<'a, F> {
@@ -289,18 +309,19 @@ impl<'a, F: Family> Fitter<'a, F> {
         let refined = self.fit.alignment == Alignment::Refined;
         let rounds = match parent {
             None => 0,
+            Some(_) if refined && level < FIRST_REFINED_WELL => FINE_ROUNDS,
             Some(_) if refined => ROUNDS_BEFORE,
             Some(_) => PARENT_ROUNDS,
         };
         let prior = self.fit.alignment == Alignment::Prior && parent.is_some();
+        let thetas = parent.map(|p| p.thetas(family, lobes, 0..p.size.height));
         self.each_texel(grid, &mut made, |i, samples, sums| {
-            match parent {
-                Some(parent) => {
-                    let mut theta = [[0.0; 4]; MAX_LOBES];
-                    naturals(family, parent.over(size, lobes, at(size, i)), &mut theta[..lobes]);
-                    assign(&theta[..lobes], samples, sums);
+            match (parent, &thetas) {
+                (Some(parent), Some(thetas)) => {
+                    let over = parent.index_over(size, at(size, i));
+                    assign(&thetas[over * lobes..][..lobes], samples, sums);
                 }
-                None => self.start(samples, sums),
+                _ => self.start(samples, sums),
             }
             if !prior {
                 iterate(family, samples, rounds, sums);
@@ -310,8 +331,8 @@ impl<'a, F: Family> Fitter<'a, F> {
             with_prior(self, grid, parent, &mut made);
         }
         if refined && level >= FIRST_REFINED {
-            let rounds =
-                REFINE_ROUNDS_PER_LOBE * if level >= FIRST_REFINED_WELL { lobes } else { lobes.div_ceil(2) };
+            let well = level >= FIRST_REFINED_WELL;
+            let rounds = if well { REFINE_ROUNDS_PER_LOBE * lobes } else { FINE_REFINE_ROUNDS };
             refine(family, grid, &mut LevelLobes { size, lobes, sums: &mut made.sums }, rounds);
         }
         made.sums.par_chunks_mut(lobes).for_each(bury);
@@ -371,20 +392,23 @@ impl<'a, F: Family> Fitter<'a, F> {
                 let (columns, _) = footprint(fine.width, size.width, x);
                 let places = rows.flat_map(|r| columns.clone().map(move |c| (r, c)));
                 let mut weights = [0.0_f32; MAX_LOBES];
+                let mut mean = [0.0_f32; 4];
                 let mut z = [0.0; MAX_LOBES];
                 for (k, (r, c)) in places.enumerate() {
                     shares(&theta[..lobes], [samples.a[k], samples.b[k], samples.c[k]], &mut z[..lobes]);
-                    let value = attribute.row(r)[c];
+                    let (value, weight) = (attribute.row(r)[c], samples.weight[k]);
+                    (0..4).for_each(|k| mean[k] += weight * value[k]);
                     for (j, carried) in carried.iter_mut().enumerate() {
-                        let z = z[j] * samples.weight[k];
+                        let z = z[j] * weight;
                         weights[j] += z;
                         (0..4).for_each(|k| carried[k] += z * value[k]);
                     }
                 }
                 for ((carried, sums), weight) in carried.iter_mut().zip(sums).zip(weights) {
-                    // A dead lobe, or one that refinement moved to where no normal is, carries nothing of its own.
-                    let scale = if weight > 0.0 { sums[0] / weight } else { 0.0 };
-                    carried.iter_mut().for_each(|c| *c *= scale);
+                    // A lobe that refinement moved to where no normal is has none to ask: it carries the texel's mean.
+                    let own =
+                        if weight > LEAST_WEIGHT * LEAST_WEIGHT { carried.map(|c| c / weight) } else { mean };
+                    *carried = own.map(|y| sums[0] * y);
                 }
             },
         );
@@ -398,11 +422,24 @@ impl<'a, F: Family> Fitter<'a, F> {
         emit: &mut dyn FnMut(&FittedRows<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
         let (lobes, size) = (self.fit.lobes, self.sizes[0]);
+        // One set of buffers for all bands: a band is megabytes that would come and go.
+        let mut sums = Vec::new();
+        let mut attributes: Vec<Vec<Four>> = vec![Vec::new(); self.job.attributes.len()];
+        let mut places = Vec::new();
         for start in (0..size.height).step_by(BAND) {
             let rows = start..(start + BAND).min(size.height);
-            let mut sums = vec![[0.0; 4]; rows.len() * size.width * lobes];
-            let mut attributes = vec![sums.clone(); self.job.attributes.len()];
-            let mut places = vec![0_usize; rows.len() * size.width];
+            let texels = rows.len() * size.width;
+            places.resize(texels, 0_usize);
+            for buffer in attributes.iter_mut().chain([&mut sums]) {
+                buffer.clear();
+                buffer.resize(texels * lobes, [0.0; 4]);
+            }
+            // The parents' rows that this band asks, their thetas worked out once.
+            let above = parent.map(|p| {
+                let first = over(rows.start, size.height, p.size.height);
+                let last = over(rows.end - 1, size.height, p.size.height);
+                (p, first, p.thetas(self.family, lobes, first..last + 1))
+            });
             let lines = sums.par_chunks_mut(size.width * lobes).zip(places.par_chunks_mut(size.width));
             lines.enumerate().for_each_init(
                 || SurfaceRow::flat(size.width),
@@ -411,7 +448,10 @@ impl<'a, F: Family> Fitter<'a, F> {
                     self.job.surface.read_row(y, row);
                     for x in 0..size.width {
                         let t = self.family.statistics(row.normal(x));
-                        places[x] = parent.map_or(0, |p| self.place(p.over(size, lobes, (x, y)), t));
+                        places[x] = above.as_ref().map_or(0, |(p, first, thetas)| {
+                            let at = p.index_over(size, (x, y)) - first * p.size.width;
+                            likeliest(&thetas[at * lobes..][..lobes], t)
+                        });
                         sums[x * lobes + places[x]] = [1.0, t[0], t[1], t[2]];
                     }
                 },
@@ -426,22 +466,18 @@ impl<'a, F: Family> Fitter<'a, F> {
         }
         Ok(())
     }
+}
 
-    /// The likeliest of the parent's lobes.
-    fn place(&self, parent: &[Four], t: [f32; 3]) -> usize {
-        let log = |sums: &Four| {
-            let theta = self.family.natural(sums);
-            theta[0] + theta[1] * t[0] + theta[2] * t[1] + theta[3] * t[2]
-        };
-        let mut best = (0, f32::MIN);
-        for (j, sums) in parent.iter().enumerate() {
-            let log = log(sums);
-            if log > best.1 {
-                best = (j, log);
-            }
+/// The lobe that a sample most likely belongs to.
+fn likeliest(thetas: &[Four], t: [f32; 3]) -> usize {
+    let mut best = (0, f32::MIN);
+    for (j, theta) in thetas.iter().enumerate() {
+        let log = theta[0] + theta[1] * t[0] + theta[2] * t[1] + theta[3] * t[2];
+        if log > best.1 {
+            best = (j, log);
         }
-        best.0
     }
+    best.0
 }
 
 /// Column and row of texel `i`.

@@ -94,12 +94,23 @@ impl SampleGrid {
         let (columns, column_weight) = footprint(self.cells.width, level.width, x);
         let (rows, row_weight) = footprint(self.cells.height, level.height, y);
         let n = self.per_cell;
+        // Where cells fill the texel they weigh the same, and nothing need be worked out for each.
+        let even = self.nests(level).then(|| 1.0 / (columns.len() * rows.len()) as f32);
         for j in rows {
             let start = (j * self.cells.width + columns.start) * n;
             let range = start..start + columns.len() * n;
             out.a.extend_from_slice(&self.planes[0][range.clone()]);
             out.b.extend_from_slice(&self.planes[1][range.clone()]);
             out.c.extend_from_slice(&self.planes[2][range.clone()]);
+            if let Some(cell) = even {
+                match self.weight.get(range) {
+                    Some(weights) if !self.weight.is_empty() => {
+                        out.weight.extend(weights.iter().map(|w| w * cell))
+                    }
+                    _ => out.weight.resize(out.a.len(), cell),
+                }
+                continue;
+            }
             let row_weight = row_weight(j) as f32;
             if self.weight.is_empty() {
                 out.weight.extend(columns.clone().map(|i| row_weight * column_weight(i) as f32));

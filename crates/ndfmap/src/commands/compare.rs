@@ -16,8 +16,9 @@ use crate::Failure;
 use crate::measure::{self, Comparison, Subject};
 use crate::report::{self, Pages};
 
-/// What every comparison carries unless told otherwise: the baselines, and each linear method.
-pub(super) const DEFAULT_METHODS: &str = "fixed,naive,toksvig,ndm,ndm:plane,slopes,sh:4,sh:7";
+/// What every comparison carries unless told otherwise: the baselines, each linear method, and mixtures.
+pub(super) const DEFAULT_METHODS: &str =
+    "fixed,naive,toksvig,ndm,ndm:plane,slopes,sh:4,sh:7,gmm:4,vmf:2,vmf:4,vmf:6";
 
 /// Measure methods against the truth, level by level
 #[derive(Debug, Args)]
@@ -34,6 +35,9 @@ pub(super) struct Compare {
     /// Bits of a stored channel; errors are those of the stored map
     #[arg(long, value_enum, default_value_t = Precision::Half)]
     precision: Precision,
+    /// Also measure between texels, where a filter mixes lobes: filtered, and by shading every neighbour
+    #[arg(long)]
+    filtering: bool,
     /// Also write a report with pictures and plots into this folder
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
@@ -55,7 +59,13 @@ impl Compare {
         for warning in &map.warnings {
             warn(&self.map, warning);
         }
-        let run = Run { map: &map, methods: &methods, brdf: &self.brdf, precision: self.precision.into() };
+        let run = Run {
+            map: &map,
+            methods: &methods,
+            brdf: &self.brdf,
+            precision: self.precision.into(),
+            filtering: self.filtering,
+        };
         let (comparison, written) = run.measure(self.report.as_deref())?;
         for file in written {
             eprintln!("ndfmap: wrote {}", file.display());
@@ -70,6 +80,7 @@ pub(super) struct Run<'a> {
     pub(super) methods: &'a [Box<dyn Method>],
     pub(super) brdf: &'a str,
     pub(super) precision: pyramid::Precision,
+    pub(super) filtering: bool,
 }
 
 impl Run<'_> {
@@ -85,6 +96,7 @@ impl Run<'_> {
             brdf: &*brdf,
             methods: self.methods,
             precision: self.precision,
+            filtering: self.filtering,
         };
         let comparison = measure::compare(&subject);
         let Some(folder) = folder else { return Ok((comparison, Vec::new())) };

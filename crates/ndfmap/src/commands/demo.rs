@@ -37,7 +37,8 @@ impl Demo {
         for spelling in DEFAULT_METHODS.split(',') {
             methods.push(method(spelling)?);
         }
-        let run = Run { map: &map, methods: &methods, brdf: BRDF, precision: Precision::Half };
+        let run =
+            Run { map: &map, methods: &methods, brdf: BRDF, precision: Precision::Half, filtering: false };
         let (comparison, mut written) = run.measure(Some(&self.output))?;
 
         let path = self.output.join("foil.slopes.ktx2");

@@ -57,9 +57,12 @@ impl Inspect {
         }
         let method = map.method(&self.file)?;
         let mut value = json!({ "level": level, "x": x, "y": y, "method": map.header.method });
-        let (Value::Object(all), Value::Object(decoded)) =
-            (&mut value, describe(method.describe(&map.pyramid.texel(level, x, y))))
-        else {
+        let channels = map.pyramid.texel(level, x, y);
+        let mut decoded = describe(method.describe(&channels[..4 * method.layers()]));
+        if let Some(lobes) = decoded.get_mut("lobes").and_then(Value::as_array_mut) {
+            lobes.iter_mut().for_each(|lobe| add_attributes(lobe, map, &channels, method.layers()));
+        }
+        let (Value::Object(all), Value::Object(decoded)) = (&mut value, decoded) else {
             unreachable!("both are written as objects");
         };
         all.extend(decoded);
@@ -100,6 +103,21 @@ impl Inspect {
             "integrability": integrability(&*map.surface),
             "warnings": map.warnings,
         }))
+    }
+}
+
+/// Adds to a lobe what it carries: the mean of each attribute over its normals, by the attribute's name.
+fn add_attributes(lobe: &mut Value, map: &NdfMap, channels: &[f32], layers: usize) {
+    let layer = lobe["layer"].as_u64().unwrap_or(0) as usize;
+    let weight = channels[4 * layer];
+    let mut carried = Map::new();
+    for (k, attribute) in map.header.attributes.iter().enumerate() {
+        let stored = &channels[4 * ((k + 1) * layers + layer)..][..attribute.channels.min(4)];
+        let mean: Vec<f32> = stored.iter().map(|y| y / weight).collect();
+        carried.insert(attribute.name.clone(), json!(mean));
+    }
+    if !carried.is_empty() {
+        lobe["attributes"] = carried.into();
     }
 }
 

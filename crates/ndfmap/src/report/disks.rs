@@ -11,11 +11,11 @@ use super::canvas::{Canvas, INK, LETTER, LINE, PAPER, Rgb};
 use crate::measure::{Comparison, Subject};
 
 /// Points of the lattice a side, and pixels a point.
-const SIDE: usize = 72;
-const SCALE: usize = 2;
+pub(super) const SIDE: usize = 72;
+pub(super) const SCALE: usize = 2;
 
 /// The normals are drawn as a sharp lobe would show them, so that all methods draw the same thing.
-const PEN: &str = "blinn-phong:200";
+pub(super) const PEN: &str = "blinn-phong:200";
 
 /// Texels drawn: at these levels, the one whose normals stray most.
 const LEVELS: [usize; 3] = [3, 5, 7];
@@ -59,7 +59,7 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Canvas {
 }
 
 /// The texel of a level whose mean normal is shortest.
-fn busiest(subject: &Subject<'_>, size: Size) -> (usize, usize) {
+pub(super) fn busiest(subject: &Subject<'_>, size: Size) -> (usize, usize) {
     use ndfmap_core::bake::Bake;
     use ndfmap_core::ndf::Toksvig;
     let bake = Bake {
@@ -75,7 +75,13 @@ fn busiest(subject: &Subject<'_>, size: Size) -> (usize, usize) {
     texels.min_by(|a, b| length(a).total_cmp(&length(b))).unwrap_or((0, 0))
 }
 
-fn plot(canvas: &mut Canvas, lattice: &DiskLattice, (x0, y0): (usize, usize), lobe: &[f64], peak: f64) {
+pub(super) fn plot(
+    canvas: &mut Canvas,
+    lattice: &DiskLattice,
+    (x0, y0): (usize, usize),
+    lobe: &[f64],
+    peak: f64,
+) {
     let pixel = |c: f64| ((c + 1.0) / 2.0 * SIDE as f64) as usize;
     for (w, value) in lattice.directions.iter().zip(lobe) {
         let colour = heat((value / peak).clamp(0.0, 1.0).sqrt());

@@ -1,5 +1,6 @@
 //! Pictures and the HTML page of a comparison.
 
+mod between;
 mod canvas;
 mod disks;
 mod plot;
@@ -8,6 +9,7 @@ mod sheet;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use minijinja::{Environment, context};
+use ndfmap_core::filtering::FilteringError;
 use ndfmap_maps::Source;
 
 use crate::Failure;
@@ -25,18 +27,30 @@ pub(crate) struct Pages<'a> {
 pub(crate) fn draw(pages: &Pages<'_>) -> Result<Vec<(&'static str, Vec<u8>)>, Failure> {
     let sheet = sheet::draw(pages.subject, pages.comparison).to_png()?;
     let disks = disks::draw(pages.subject, pages.comparison).to_png()?;
+    let between = between::draw(pages.subject, pages.comparison).map(|canvas| canvas.to_png()).transpose()?;
     let plot = plot::errors_by_level(pages.comparison)?;
-    let html = page(pages, &sheet, &disks, &plot)?;
+    let figures = Figures { sheet: &sheet, disks: &disks, between: between.as_deref(), plot: &plot };
+    let html = page(pages, &figures)?;
     let json = format!("{:#}\n", pages.comparison.to_json(&pages.source.file));
-    Ok(vec![
+    let mut files = vec![
         ("report.html", html.into_bytes()),
         ("contact-sheet.png", sheet),
         ("ndf.png", disks),
         ("compare.json", json.into_bytes()),
-    ])
+    ];
+    files.extend(between.map(|between| ("alignment.png", between)));
+    Ok(files)
 }
 
-fn page(pages: &Pages<'_>, sheet: &[u8], disks: &[u8], plot: &str) -> Result<String, Failure> {
+/// What a page shows, drawn.
+struct Figures<'a> {
+    sheet: &'a [u8],
+    disks: &'a [u8],
+    between: Option<&'a [u8]>,
+    plot: &'a str,
+}
+
+fn page(pages: &Pages<'_>, figures: &Figures<'_>) -> Result<String, Failure> {
     let failed = |e: minijinja::Error| Failure::Failed(format!("cannot write the report: {e}"));
     let mut environment = Environment::new();
     environment.add_template("report.html", include_str!("../../templates/report.html")).map_err(failed)?;
@@ -58,6 +72,15 @@ fn page(pages: &Pages<'_>, sheet: &[u8], disks: &[u8], plot: &str) -> Result<Str
             context! { method => row.method.clone(), bytes => row.bytes_per_texel, bake => bake, cells => cells }
         })
         .collect();
+    let filtering: Vec<minijinja::Value> = comparison
+        .rows
+        .iter()
+        .filter(|row| !row.filtering.is_empty())
+        .map(|row| {
+            let cell = |e: &FilteringError| format!("{} / {}", three_digits(e.filtered), three_digits(e.reference));
+            context! { method => row.method.clone(), cells => row.filtering.iter().map(cell).collect::<Vec<_>>() }
+        })
+        .collect();
     let sizes: Vec<String> = comparison.sizes.iter().map(|s| format!("{}×{}", s.width, s.height)).collect();
     let template = environment.get_template("report.html").map_err(failed)?;
     template
@@ -68,9 +91,11 @@ fn page(pages: &Pages<'_>, sheet: &[u8], disks: &[u8], plot: &str) -> Result<Str
             sizes => sizes,
             rows => rows,
             warnings => pages.warnings.to_vec(),
-            plot => plot,
-            sheet => STANDARD.encode(sheet),
-            disks => STANDARD.encode(disks),
+            plot => figures.plot,
+            sheet => STANDARD.encode(figures.sheet),
+            disks => STANDARD.encode(figures.disks),
+            between => figures.between.map(|b| STANDARD.encode(b)),
+            filtering => filtering,
             version => env!("CARGO_PKG_VERSION"),
         })
         .map_err(failed)

@@ -1,0 +1,199 @@
+//! `--method auto`: bakes a map with every candidate, measures each against the truth, and says which one to take.
+//!
+//! What is measured is what a viewer meets: the error between texels, where a filter mixes, at levels 3 and 6, on the map
+//! as it would be stored. A candidate's error is the worse of the two levels.
+
+use ndfmap_core::bake::Bake;
+use ndfmap_core::brdf::Brdf;
+use ndfmap_core::error::{Truth, lattice_for};
+use ndfmap_core::filtering::{filtering_error, true_corners};
+use ndfmap_core::ndf;
+use ndfmap_core::pyramid::{Precision, level_sizes};
+use ndfmap_core::surface::Surface;
+use serde_json::{Value, json};
+
+use crate::Failure;
+use crate::measure::three_digits;
+use crate::progress::Progress;
+
+/// The spelling that asks for a choice.
+pub(crate) const AUTO: &str = "auto";
+
+/// What may be chosen: one of each kind and size that is the best of its size on some map.
+const CANDIDATES: [&str; 13] = [
+    "naive",
+    "toksvig",
+    "slopes",
+    "ndm:plane",
+    "sh:4",
+    "sh:7",
+    "vmf:1",
+    "vmf:2",
+    "vmf:3",
+    "vmf:4",
+    "vmf:6",
+    "vmf:8",
+    "gmm:4",
+];
+
+/// Levels at which candidates are measured; on small maps the coarsest that has neighbours.
+const LEVELS: [usize; 2] = [3, 6];
+
+/// What the choice is bound by.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Limit {
+    /// Largest error.
+    Error(f64),
+    /// Most bytes a texel of the finest level, before compression.
+    Bytes(usize),
+}
+
+/// A choice to be made.
+pub(crate) struct Auto<'a> {
+    pub(crate) surface: &'a dyn Surface,
+    pub(crate) brdf: &'a dyn Brdf,
+    pub(crate) precision: Precision,
+    /// Only methods whose lobes carry attributes.
+    pub(crate) lobes_only: bool,
+}
+
+/// A candidate that was measured.
+struct Candidate {
+    method: String,
+    bytes: usize,
+    error: f64,
+}
+
+/// What was chosen, and why.
+pub(crate) struct Choice {
+    pub(crate) method: String,
+    why: String,
+    levels: Vec<usize>,
+    brdf: String,
+    candidates: Vec<Candidate>,
+}
+
+impl Auto<'_> {
+    /// Measures and chooses.
+    pub(crate) fn choose(&self, limit: Limit) -> Result<Choice, Failure> {
+        let sizes = level_sizes(self.surface.size());
+        let last = sizes.iter().rposition(|s| s.area() > 1).ok_or_else(|| {
+            Failure::Usage("a map of one texel has nothing to measure: name a method".to_owned())
+        })?;
+        let mut levels: Vec<usize> = LEVELS.iter().map(|l| *l.min(&last)).collect();
+        levels.dedup();
+        let lattice = lattice_for(self.brdf);
+        let corners = {
+            let progress = Progress::new("truth");
+            let truth = Truth::new(self.surface, self.brdf, &lattice);
+            true_corners(&truth, self.surface.wraps(), &levels, &|f| progress.set(f))
+        };
+        let mut candidates = Vec::new();
+        for spelling in CANDIDATES {
+            let method = ndf::parse(spelling).map_err(|e| Failure::Failed(e.to_string()))?;
+            let bytes = method.layers() * self.precision.texel_bytes();
+            if self.lobes_only && method.fit().is_none()
+                || matches!(limit, Limit::Bytes(most) if bytes > most)
+            {
+                continue;
+            }
+            let progress = Progress::new(spelling);
+            let bake = Bake {
+                surface: self.surface,
+                method: &*method,
+                precision: self.precision,
+                progress: &|f| progress.set(f),
+            };
+            let (pyramid, _) = bake.to_pyramid();
+            let error = |truth| filtering_error(&pyramid, &*method, self.brdf, &lattice, truth).filtered;
+            let error = corners.iter().map(error).fold(0.0, f64::max);
+            candidates.push(Candidate { method: spelling.to_owned(), bytes, error });
+        }
+        candidates.sort_by(|a, b| {
+            (a.bytes, a.error).partial_cmp(&(b.bytes, b.error)).unwrap_or(std::cmp::Ordering::Equal)
+        });
+        let (chosen, why) = pick(&candidates, limit)?;
+        let method = candidates[chosen].method.clone();
+        Ok(Choice { method, why, levels, brdf: self.brdf.spelling(), candidates })
+    }
+}
+
+/// The candidate to take, among those sorted by bytes, and the reason in words.
+fn pick(candidates: &[Candidate], limit: Limit) -> Result<(usize, String), Failure> {
+    let least = (0..candidates.len()).min_by(|a, b| candidates[*a].error.total_cmp(&candidates[*b].error));
+    match limit {
+        Limit::Error(most) => {
+            if let Some(i) = candidates.iter().position(|c| c.error <= most) {
+                let Candidate { bytes, error, .. } = &candidates[i];
+                return Ok((
+                    i,
+                    format!(
+                        "the cheapest whose error is at most {most}: {error:.3} at {bytes} bytes a texel"
+                    ),
+                ));
+            }
+            let best = least
+                .map(|i| format!("; the least is {:.3}, by `{}`", candidates[i].error, candidates[i].method));
+            Err(Failure::Failed(format!(
+                "no method's error is at most {most} on this map{}",
+                best.unwrap_or_default()
+            )))
+        }
+        Limit::Bytes(most) => match least {
+            Some(i) => {
+                let Candidate { bytes, error, .. } = &candidates[i];
+                Ok((i, format!("the least error within {most} bytes a texel: {error:.3} at {bytes}")))
+            }
+            None => Err(Failure::Failed(format!("no method takes at most {most} bytes a texel"))),
+        },
+    }
+}
+
+impl Choice {
+    /// For `bake --json`.
+    pub(crate) fn to_json(&self) -> Value {
+        let row = |c: &Candidate| json!({ "method": c.method, "bytes_per_texel": c.bytes, "error": c.error });
+        json!({
+            "why": self.why,
+            "brdf": self.brdf,
+            "levels": self.levels,
+            "candidates": self.candidates.iter().map(row).collect::<Vec<_>>(),
+        })
+    }
+
+    /// For people.
+    pub(crate) fn to_table(&self) -> String {
+        let levels = self.levels.iter().map(usize::to_string).collect::<Vec<_>>().join(" and ");
+        let mut text = format!("error between texels with {}, the worst of levels {levels}:\n", self.brdf);
+        for c in &self.candidates {
+            let mark = if c.method == self.method { "  <- chosen" } else { "" };
+            text += &format!(
+                "  {:10} {:>4} bytes a texel {:>7}{mark}\n",
+                c.method,
+                c.bytes,
+                three_digits(c.error)
+            );
+        }
+        text + &format!("ndfmap: chose `{}`: {}", self.method, self.why)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn candidates() -> Vec<Candidate> {
+        [("naive", 8, 0.9), ("slopes", 16, 0.3), ("vmf:2", 16, 0.35), ("vmf:4", 32, 0.1)]
+            .map(|(m, bytes, error)| Candidate { method: m.to_owned(), bytes, error })
+            .into()
+    }
+
+    #[test]
+    fn the_cheapest_that_is_good_enough_or_the_best_that_fits() {
+        let pick = |limit| pick(&candidates(), limit).map(|(i, _)| i).map_err(|e| e.to_string());
+        assert_eq!(pick(Limit::Error(0.32)), Ok(1));
+        assert_eq!(pick(Limit::Error(0.2)), Ok(3));
+        assert_eq!(pick(Limit::Bytes(64)), Ok(3));
+        assert!(pick(Limit::Error(0.01)).unwrap_err().contains("the least is 0.100, by `vmf:4`"));
+    }
+}

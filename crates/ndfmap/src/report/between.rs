@@ -1,0 +1,94 @@
+//! What a filter makes of lobes at a corner between four texels, as in Tan et al. 2005, figure 5: the histogram of the
+//! normals, lobes that were not aligned, aligned ones, and the reference path that shades each texel by itself.
+
+use glam::DVec2;
+use ndfmap_core::bake::Bake;
+use ndfmap_core::brdf;
+use ndfmap_core::error::Truth;
+use ndfmap_core::filtering::evaluate_neighbours;
+use ndfmap_core::fit::{Alignment, LobeKind};
+use ndfmap_core::ndf::{self, Method};
+use ndfmap_core::pyramid::Pyramid;
+use ndfmap_core::sphere::DiskLattice;
+
+use super::canvas::{Canvas, LETTER, LINE};
+use super::disks::{PEN, SCALE, SIDE, busiest, plot};
+use crate::measure::{Comparison, Row, Subject};
+
+/// The level drawn, where there is one.
+const LEVEL: usize = 4;
+
+/// Titles of the columns.
+const COLUMNS: [&str; 4] = ["histogram", "unaligned", "as baked", "each texel shaded"];
+
+/// Draws a row for every mixture that was compared; `None` when there is none, or no corner to look at.
+pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Option<Canvas> {
+    let rows: Vec<Mixture<'_>> = comparison.rows.iter().filter_map(mixture).collect();
+    let level = (0..comparison.sizes.len()).rev().find(|l| *l <= LEVEL && comparison.sizes[*l].area() > 1)?;
+    if rows.is_empty() {
+        return None;
+    }
+    let size = comparison.sizes[level];
+    let pen = brdf::parse(PEN).unwrap_or_else(|e| unreachable!("the pen is a constant: {e}"));
+    let lattice = DiskLattice::new(SIDE, 0.99);
+    let truth = Truth::new(subject.surface, &*pen, &lattice);
+    let (x, y) = busiest(subject, size);
+    let place = DVec2::new((x + 1) as f64 / size.width as f64, (y + 1) as f64 / size.height as f64);
+    let disk = SIDE * SCALE;
+    let (label, step_x, step_y) = (20 * LETTER, disk.max(18 * LETTER) + 8, disk + LINE);
+    let mut canvas = Canvas::new(label + COLUMNS.len() * step_x, 2 * LINE + rows.len() * step_y);
+    for (column, title) in COLUMNS.iter().enumerate() {
+        canvas.text(label + column * step_x, 8, title);
+    }
+    let mut histogram = vec![0.0; lattice.len()];
+    for n in rows[0].row.pyramid.neighbours(place, level as f64) {
+        let lobe = truth.texel(size, n.x, n.y);
+        histogram.iter_mut().zip(lobe).for_each(|(sum, f)| *sum += n.weight * f);
+    }
+    let peak = histogram.iter().copied().fold(1e-12, f64::max);
+    for (at, Mixture { row, method, unaligned }) in rows.iter().enumerate() {
+        let y = 2 * LINE + at * step_y;
+        canvas.text(8, y + 8, &row.method);
+        canvas.text(8, y + 8 + LINE, &format!("level {level}, corner"));
+        let bake = Bake {
+            surface: subject.surface,
+            method: &**unaligned,
+            precision: subject.precision,
+            progress: &|_| (),
+        };
+        let (apart, _) = bake.to_pyramid();
+        let filtered = |pyramid: &Pyramid, method: &dyn Method| {
+            let mut out = vec![0.0; lattice.len()];
+            method.evaluator(&*pen, &lattice.directions).evaluate(&pyramid.bilinear(level, place), &mut out);
+            out
+        };
+        let mut shaded = vec![0.0; lattice.len()];
+        let evaluator = method.evaluator(&*pen, &lattice.directions);
+        evaluate_neighbours(&row.pyramid, &*evaluator, (place, level as f64), &mut shaded);
+        let columns =
+            [histogram.clone(), filtered(&apart, &**unaligned), filtered(&row.pyramid, &**method), shaded];
+        for (column, lobe) in columns.iter().enumerate() {
+            plot(&mut canvas, &lattice, (label + column * step_x, y), lobe, peak);
+        }
+    }
+    Some(canvas)
+}
+
+/// A mixture's row, its method, and the same method unaligned.
+struct Mixture<'a> {
+    row: &'a Row,
+    method: Box<dyn Method>,
+    unaligned: Box<dyn Method>,
+}
+
+fn mixture(row: &Row) -> Option<Mixture<'_>> {
+    let method = ndf::parse(&row.method).ok()?;
+    let fit = method.fit().filter(|f| f.lobes > 1 && f.alignment != Alignment::Unaligned)?;
+    let name = match fit.kind {
+        LobeKind::Spherical => "vmf",
+        LobeKind::Planar => "gmm",
+        LobeKind::Peaks => return None,
+    };
+    let unaligned = ndf::parse(&format!("{name}:{}:{}", fit.lobes, Alignment::Unaligned.name())).ok()?;
+    Some(Mixture { row, method, unaligned })
+}
