@@ -103,6 +103,65 @@ fn errors_on_real_maps_agree_with_the_independent_program() {
 }
 
 #[test]
+fn fitted_lobes_are_at_least_as_good_as_the_independent_program() {
+    let Some(data) = data() else { return };
+    // The same program's plain EM from furthest points, at blocks of 64: vmf:1, 2, 4, 6 and gmm:4.
+    let table = [
+        ("ambientcg_Bricks075B_1K_NormalGL.jpg", 50, [0.229, 0.144, 0.062, 0.045, 0.085]),
+        ("ambientcg_Bricks075B_1K_NormalGL.jpg", 400, [0.368, 0.234, 0.13, 0.105, 0.141]),
+        ("godot_scifi_2_normal.png", 50, [0.503, 0.265, 0.067, 0.048, 0.108]),
+        ("godot_scifi_2_normal.png", 400, [0.801, 0.421, 0.194, 0.136, 0.189]),
+        ("bevy_water_normals.png", 50, [0.732, 0.52, 0.284, 0.2, 0.411]),
+        ("bevy_water_normals.png", 400, [0.854, 0.698, 0.548, 0.466, 0.659]),
+    ];
+    let methods = ["vmf:1", "vmf:2", "vmf:4", "vmf:6", "gmm:4"];
+    for (map, s, expected) in table {
+        let path = data.join("normal").join(map).display().to_string();
+        let brdf = format!("blinn-phong:{s}");
+        let told = json(&["compare", &path, "--brdf", &brdf, "--methods", &methods.join(","), "--json"]);
+        for (method, expected) in methods.iter().zip(expected) {
+            let got = told["methods"][method]["levels"][6]["error"].as_f64().unwrap();
+            eprintln!(
+                "{map} s = {s} {method}: {got:.3}, numpy {expected} ({:+.1} %)",
+                (got / expected - 1.0) * 100.0
+            );
+            // It drew 64 random blocks where we take every texel: up to 6 % on the linear methods, and fits differ.
+            assert!(got < 1.12 * expected, "{map} {s} {method}: {got} for {expected}");
+        }
+    }
+}
+
+#[test]
+fn alignment_pays_between_the_texels_of_real_maps() {
+    let Some(data) = data() else { return };
+    for map in ["godot_scifi_2_normal.png", "vpython_stones_bumpmap.jpg"] {
+        let path = data.join("normal").join(map).display().to_string();
+        let methods = "toksvig,vmf:4,vmf:4:parent,vmf:4:unaligned";
+        let told = json(&["compare", &path, "--methods", methods, "--filtering", "--json"]);
+        let mean = |method: &str, key: &str| {
+            let levels = told["methods"][method]["filtering"].as_array().unwrap();
+            levels[2..6].iter().map(|l| l[key].as_f64().unwrap()).sum::<f64>() / 4.0
+        };
+        let between = |method: &str| mean(method, "between");
+        eprintln!(
+            "{map}: refined {:.3}, parent {:.3}, unaligned {:.3}, toksvig {:.3}",
+            between("vmf:4"),
+            between("vmf:4:parent"),
+            between("vmf:4:unaligned"),
+            between("toksvig")
+        );
+        // What it exists for: a fifth less than starting from the parent, over several maps; here, each by itself.
+        assert!(between("vmf:4") < 0.9 * between("vmf:4:parent"), "{map}");
+        assert!(
+            between("vmf:4") < 0.6 * between("vmf:4:unaligned")
+                && between("vmf:4") < 0.5 * between("toksvig")
+        );
+        // And without giving up the texels.
+        assert!(mean("vmf:4", "texels") < 1.2 * mean("vmf:4:parent", "texels"), "{map}");
+    }
+}
+
+#[test]
 fn a_damaged_colour_profile_does_not_matter() {
     let Some(data) = data() else { return };
     let folder = tempfile::tempdir().unwrap();

@@ -120,6 +120,9 @@ pub struct FittedRows<'a> {
 /// Rounds of EM for a texel that starts from furthest points.
 const ALONE_ROUNDS: usize = 40;
 
+/// Starts for a texel that is fitted by itself.
+const ALONE_STARTS: usize = 4;
+
 /// Rounds of EM for a texel that starts from its parent, where nothing follows.
 const PARENT_ROUNDS: usize = 10;
 
@@ -271,8 +274,8 @@ impl<'a, F: Family> Fitter<'a, F> {
         Level { size, sums: vec![[0.0; 4]; size.area() * self.fit.lobes] }
     }
 
-    /// Every level above the finest, each texel by itself: the better of EM from the normals furthest apart, and from the
-    /// furthest of the lobes of the finer texels below it.
+    /// Every level above the finest, each texel by itself: the likeliest that EM finds from the normals furthest apart, from
+    /// the furthest of the lobes of the finer texels below it, and from seeds drawn at random.
     fn alone(&self) -> Vec<Level> {
         let lobes = self.fit.lobes;
         let mut levels = vec![Level { size: self.sizes[0], sums: Vec::new() }];
@@ -280,18 +283,25 @@ impl<'a, F: Family> Fitter<'a, F> {
             let mut made = self.empty(level);
             let (size, finer) = (made.size, &levels[level - 1]);
             self.each_texel(self.samplings.for_level(size), &mut made, |i, samples, sums| {
-                start_from_furthest(samples, samples, sums);
-                iterate(self.family, samples, ALONE_ROUNDS, sums);
-                if level == 1 {
-                    return;
-                }
-                let mut other = [[0.0; 4]; MAX_LOBES];
-                let other = &mut other[..lobes];
-                start_from_furthest(&lobe_means(finer, lobes, size, at(size, i)), samples, other);
-                iterate(self.family, samples, ALONE_ROUNDS, other);
-                let likely = |sums: &[Four]| log_likelihood(self.family, samples, sums);
-                if likely(other) > likely(sums) {
-                    sums.copy_from_slice(other);
+                let mut likeliest = f64::MIN;
+                let mut own = [[0.0; 4]; MAX_LOBES];
+                let own = &mut own[..lobes];
+                let mut random = Pcg64Mcg::seed_from_u64(i as u64);
+                for start in 0..ALONE_STARTS {
+                    match start {
+                        0 => start_from_furthest(samples, samples, own),
+                        // The finest level's lobes are the normals themselves, which the first start has seen.
+                        1 if level > 1 => {
+                            start_from_furthest(&lobe_means(finer, lobes, size, at(size, i)), samples, own);
+                        }
+                        _ => start_at_random(samples, &mut random, own),
+                    }
+                    iterate(self.family, samples, ALONE_ROUNDS, own);
+                    let likely = log_likelihood(self.family, samples, own);
+                    if likely > likeliest {
+                        likeliest = likely;
+                        sums.copy_from_slice(own);
+                    }
                 }
             });
             levels.push(made);
