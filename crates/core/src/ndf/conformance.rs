@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::{FlatLobe, Method, TABLE, parse};
+use super::{Decoded, FlatLobe, Method, TABLE, parse};
 use crate::bake::Bake;
 use crate::brdf::{self, Brdf};
 use crate::fit::Alignment;
@@ -258,6 +258,41 @@ fn degenerate_normals_stay_finite() {
                             method.spelling()
                         );
                     }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn lobes_of_degenerate_maps_have_weights_that_sum_to_one_and_point_somewhere() {
+    // Constant, two normals only, one texel, at and below the horizon, and fewer distinct normals than lobes.
+    let two = [Vec3::new(0.6, 0.0, 0.8), Vec3::new(-0.6, 0.0, 0.8)];
+    let nasty = [Vec3::X, Vec3::NEG_Z, Vec3::NEG_X, Vec3::new(0.6, 0.0, -0.8), Vec3::Y, Vec3::Z];
+    let maps = [
+        of_normals((8, 8), |_, _| Vec3::Z),
+        of_normals((8, 8), |x, y| two[(x + y) % 2]),
+        of_normals((1, 1), |_, _| two[0]),
+        of_normals((12, 7), |x, y| nasty[(x + 2 * y) % 6]),
+    ];
+    for method in methods().iter().filter(|m| m.fit().is_some()) {
+        for (surface, precision) in maps.iter().flat_map(|m| [(m, Precision::Half), (m, Precision::Single)]) {
+            let pyramid = bake(&**method, surface, precision);
+            for (level, size) in pyramid.sizes().iter().enumerate() {
+                for i in 0..size.area() {
+                    let texel = pyramid.texel(level, i % size.width, i / size.width);
+                    let lobes: Vec<(f64, DVec3)> = match method.describe(&texel) {
+                        Decoded::Lobes(l) | Decoded::Peaks(l) => {
+                            l.iter().map(|l| (l.weight, l.mean)).collect()
+                        }
+                        Decoded::PlanarLobes(l) => l.iter().map(|l| (l.weight, l.mean.extend(0.0))).collect(),
+                        other => panic!("{} decodes to {other:?}", method.spelling()),
+                    };
+                    let total: f64 = lobes.iter().map(|l| l.0).sum();
+                    // Peaks are not divided by their sum: eight rounded half floats.
+                    assert!((total - 1.0).abs() < 2e-3, "{} level {level}: {lobes:?}", method.spelling());
+                    let points = |m: DVec3| m.is_finite() && (m.z == 0.0 || (m.length() - 1.0).abs() < 1e-6);
+                    assert!(lobes.iter().all(|l| l.0 > 0.0 && points(l.1)), "{}", method.spelling());
                 }
             }
         }

@@ -27,7 +27,10 @@ pub(crate) struct Pages<'a> {
 pub(crate) fn draw(pages: &Pages<'_>) -> Result<Vec<(&'static str, Vec<u8>)>, Failure> {
     let sheet = sheet::draw(pages.subject, pages.comparison).to_png()?;
     let disks = disks::draw(pages.subject, pages.comparison).to_png()?;
-    let between = between::draw(pages.subject, pages.comparison).map(|canvas| canvas.to_png()).transpose()?;
+    // It bakes every mixture once more, unaligned: seconds that only those who ask about filtering should wait for.
+    let asked = pages.subject.filtering;
+    let between = asked.then(|| between::draw(pages.subject, pages.comparison)).flatten();
+    let between = between.map(|canvas| canvas.to_png()).transpose()?;
     let plot = plot::errors_by_level(pages.comparison)?;
     let figures = Figures { sheet: &sheet, disks: &disks, between: between.as_deref(), plot: &plot };
     let html = page(pages, &figures)?;
