@@ -316,7 +316,8 @@ impl<'a, F: Family> Fitter<'a, F> {
         let mut made = self.empty(level);
         let size = made.size;
         let grid = self.samplings.for_level(size);
-        let refined = self.fit.alignment == Alignment::Refined;
+        // One lobe has nothing to be aligned with, and its sums are exact means: refinement would only bend it to one gloss.
+        let refined = self.fit.alignment == Alignment::Refined && lobes > 1;
         let rounds = match parent {
             None => 0,
             Some(_) if refined && level < FIRST_REFINED_WELL => FINE_ROUNDS,
