@@ -184,7 +184,7 @@ fn headers_that_contradict_their_file_are_refused() {
         changed[at..at + to.len()].copy_from_slice(to.as_bytes());
         read_ndf(Path::new("map.ktx2"), &changed).unwrap_err().to_string()
     };
-    assert!(replaced("\"slopes\"", "\"vmf:99\"").contains("there is no method called `vmf`"));
+    assert!(replaced("\"slopes\"", "\"vfm:99\"").contains("there is no method called `vfm`"));
     assert!(
         replaced("\"version\":1", "\"version\":7")
             .contains("has header version 7; this program reads up to 1")
