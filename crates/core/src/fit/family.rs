@@ -155,7 +155,7 @@ fn length_of_variance(variance: f32) -> f32 {
 }
 
 /// `1 - z` of a unit vector without cancelling near the pole.
-fn from_pole(m: &[f32; 3]) -> f32 {
+pub(crate) fn from_pole(m: &[f32; 3]) -> f32 {
     if m[2] > 0.0 { (m[0] * m[0] + m[1] * m[1]) / (1.0 + m[2]) } else { 1.0 - m[2] }
 }
 

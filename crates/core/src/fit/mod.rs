@@ -25,6 +25,7 @@ use rayon::prelude::*;
 
 pub use assign::MAX_LOBES;
 pub use family::Four;
+pub(crate) use family::from_pole;
 pub use peaks::SHARPEST;
 
 use self::assign::{assign, shares};
@@ -192,10 +193,7 @@ impl Level {
 
     /// The lobes of the texel that covers the middle of texel `(x, y)` of a level of `finer` size.
     fn over(&self, finer: Size, lobes: usize, (x, y): (usize, usize)) -> &[Four] {
-        let up = |i: usize, fine: usize, coarse: usize| ((2 * i + 1) * coarse / (2 * fine)).min(coarse - 1);
-        let at =
-            up(y, finer.height, self.size.height) * self.size.width + up(x, finer.width, self.size.width);
-        &self.sums[at * lobes..][..lobes]
+        &self.sums[self.index_over(finer, (x, y)) * lobes..][..lobes]
     }
 
     /// `theta` of every lobe of some rows, in place of their sums: what is asked of a parent by several children.
@@ -310,7 +308,7 @@ impl<'a, F: Family> Fitter<'a, F> {
         levels
     }
 
-    /// A level started from its parent, or from furthest points where there is none.
+    /// A level started from its parent; the coarsest, which has none, by [`Self::start`].
     fn descend(&self, level: usize, parent: Option<&Level>) -> Level {
         let (family, lobes) = (self.family, self.fit.lobes);
         let mut made = self.empty(level);

@@ -8,10 +8,10 @@
 
 use glam::{DVec2, DVec3};
 
-use super::mixture::{Lobes, MixtureEvaluator, Shaded, parse_mixture};
+use super::mixture::{Lobes, MixtureEvaluator, Shaded, effective, parse_mixture};
 use super::{Decoded, Evaluator, Method, PlanarLobe, Representation, Row, Sample};
 use crate::brdf::Brdf;
-use crate::fit::{Fit, Four, LobeKind, MAX_LOBES};
+use crate::fit::{Fit, Four, LobeKind};
 use crate::units::SlopeVariance;
 
 /// Planar Gaussian lobes.
@@ -113,15 +113,11 @@ impl Representation for Gmm {
     }
 
     fn pack(&self, sums: &Lobes, channels: &mut [f32]) {
-        channels.as_chunks_mut().0.iter_mut().zip(sums.all()).for_each(|(rgba, lobe)| *rgba = *lobe);
+        sums.to_channels(channels);
     }
 
     fn unpack(&self, channels: &[f32]) -> Lobes {
-        let mut sums = self.zero();
-        for (j, rgba) in channels.as_chunks().0.iter().take(self.fit.lobes.min(MAX_LOBES)).enumerate() {
-            sums.add(j, *rgba, 1.0);
-        }
-        sums
+        Lobes::from_channels(self.fit.lobes, channels)
     }
 
     fn decode(&self, sums: &Lobes) -> GaussianMixture {
@@ -133,11 +129,7 @@ impl Representation for Gmm {
         lobes: &GaussianMixture,
         brdf: &'a dyn Brdf,
     ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        let widened: Vec<(f64, DVec3, Box<dyn Brdf>)> =
-            lobes.lobes.iter().map(|l| (l.weight, l.mean, brdf.widen(l.variance))).collect();
-        Box::new(move |w| {
-            widened.iter().map(|(weight, mu, lobe)| weight * lobe.evaluate(planar_cosine(w, *mu))).sum()
-        })
+        effective(&lobes.lobes, brdf, planar_cosine)
     }
 
     fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {

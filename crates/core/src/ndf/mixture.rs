@@ -23,6 +23,24 @@ impl Lobes {
         Self { sums: [[0.0; 4]; MAX_LOBES], count }
     }
 
+    /// Reads RGBA layers, one a lobe.
+    pub(super) fn from_channels(count: usize, channels: &[f32]) -> Self {
+        let mut lobes = Self::zero(count);
+        lobes.sums[..count].copy_from_slice(&channels.as_chunks().0[..count]);
+        lobes
+    }
+
+    /// Writes RGBA layers, one a lobe.
+    pub(super) fn to_channels(self, channels: &mut [f32]) {
+        channels.copy_from_slice(self.all().as_flattened());
+    }
+
+    /// Every lobe changed by `f`.
+    pub(super) fn map(mut self, f: impl Fn(&Four) -> Four) -> Self {
+        self.sums[..self.count].iter_mut().for_each(|s| *s = f(s));
+        self
+    }
+
     /// Adds to lobe `j`.
     pub(super) fn add(&mut self, j: usize, values: Four, weight: f32) {
         self.sums[j].iter_mut().zip(values).for_each(|(sum, v)| *sum += weight * v);
@@ -108,12 +126,30 @@ pub(super) fn spell(name: &str, fit: &Fit, word: Option<&str>) -> String {
     text
 }
 
+/// The BRDF's argument for a direction and a lobe's mean.
+pub(super) type Cosine = fn(DVec3, DVec3) -> f64;
+
+/// That of lobes on the sphere.
+pub(super) fn cosine(w: DVec3, mu: DVec3) -> f64 {
+    w.dot(mu)
+}
+
+/// The effective lobe of a mixture: the BRDF widened by each lobe, around its mean.
+pub(super) fn effective<'a>(
+    lobes: &[Shaded],
+    brdf: &'a dyn Brdf,
+    cosine: Cosine,
+) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+    let widened: Vec<(f64, DVec3, Box<dyn Brdf>)> =
+        lobes.iter().map(|l| (l.weight, l.mean, brdf.widen(l.variance))).collect();
+    Box::new(move |w| widened.iter().map(|(weight, mu, lobe)| weight * lobe.evaluate(cosine(w, *mu))).sum())
+}
+
 /// Evaluates mixtures direction by direction, leaving out what lies beyond a lobe's reach.
-pub(super) struct MixtureEvaluator<'a, L, C> {
+pub(super) struct MixtureEvaluator<'a, L> {
     /// Decodes channels.
     pub(super) lobes: L,
-    /// The BRDF's argument for a direction and a mean.
-    pub(super) cosine: C,
+    pub(super) cosine: Cosine,
     pub(super) brdf: &'a dyn Brdf,
     pub(super) directions: &'a [DVec3],
 }
@@ -135,10 +171,9 @@ fn least_cosine(lobe: &dyn Brdf) -> f64 {
     dark
 }
 
-impl<L, C> Evaluator for MixtureEvaluator<'_, L, C>
+impl<L> Evaluator for MixtureEvaluator<'_, L>
 where
     L: Fn(&[f32]) -> Vec<Shaded> + Send + Sync,
-    C: Fn(DVec3, DVec3) -> f64 + Send + Sync,
 {
     fn evaluate(&self, channels: &[f32], out: &mut [f64]) {
         out.fill(0.0);

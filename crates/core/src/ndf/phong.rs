@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::mixture::{Lobes, MixtureEvaluator, Shaded};
+use super::mixture::{Lobes, MixtureEvaluator, Shaded, cosine, effective};
 use super::{Decoded, Evaluator, Method, MixtureLobe, Representation, Row, Sample};
 use crate::brdf::Brdf;
 use crate::fit::{Alignment, Fit, Four, LobeKind, MAX_LOBES, SHARPEST};
@@ -102,15 +102,11 @@ impl Representation for Phong {
     }
 
     fn pack(&self, sums: &Lobes, channels: &mut [f32]) {
-        channels.as_chunks_mut().0.iter_mut().zip(sums.all()).for_each(|(rgba, peak)| *rgba = *peak);
+        sums.to_channels(channels);
     }
 
     fn unpack(&self, channels: &[f32]) -> Lobes {
-        let mut sums = self.zero();
-        for (j, rgba) in channels.as_chunks().0.iter().take(self.peaks.min(MAX_LOBES)).enumerate() {
-            sums.add(j, *rgba, 1.0);
-        }
-        sums
+        Lobes::from_channels(self.peaks, channels)
     }
 
     fn decode(&self, sums: &Lobes) -> PhongPeaks {
@@ -118,14 +114,12 @@ impl Representation for Phong {
     }
 
     fn effective<'a>(&'a self, peaks: &PhongPeaks, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        let widened: Vec<(f64, DVec3, Box<dyn Brdf>)> =
-            peaks.peaks.iter().map(|p| (p.weight, p.mean, brdf.widen(p.variance))).collect();
-        Box::new(move |w| widened.iter().map(|(weight, mu, lobe)| weight * lobe.evaluate(w.dot(*mu))).sum())
+        effective(&peaks.peaks, brdf, cosine)
     }
 
     fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
         let lobes = |channels: &[f32]| Self::peaks(&self.unpack(channels));
-        Box::new(MixtureEvaluator { lobes, cosine: |w: DVec3, mu: DVec3| w.dot(mu), brdf, directions })
+        Box::new(MixtureEvaluator { lobes, cosine, brdf, directions })
     }
 
     fn fit(&self) -> Option<Fit> {

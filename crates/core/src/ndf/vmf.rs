@@ -10,10 +10,10 @@
 
 use glam::DVec3;
 
-use super::mixture::{Lobes, MixtureEvaluator, Shaded, parse_mixture};
+use super::mixture::{Lobes, MixtureEvaluator, Shaded, cosine, effective, parse_mixture};
 use super::{Decoded, Evaluator, Method, MixtureLobe, Representation, Row, Sample};
 use crate::brdf::Brdf;
-use crate::fit::{Fit, Four, LobeKind, MAX_LOBES};
+use crate::fit::{Fit, Four, LobeKind, from_pole};
 use crate::units::SlopeVariance;
 
 /// Von Mises-Fisher lobes.
@@ -109,9 +109,8 @@ impl Representation for Vmf {
 
     /// Without a fit, all normals go to the first lobe.
     fn accumulate(&self, sums: &mut Lobes, sample: &Sample, weight: f32) {
-        let [x, y, z] = sample.normal.to_array();
-        let from_pole = if z > 0.0 { (x * x + y * y) / (1.0 + z) } else { 1.0 - z };
-        sums.add(0, [1.0, x, y, from_pole], weight);
+        let n = sample.normal.to_array();
+        sums.add(0, [1.0, n[0], n[1], from_pole(&n)], weight);
     }
 
     fn blend(&self, sums: &mut Lobes, part: &Lobes, weight: f32) {
@@ -119,27 +118,16 @@ impl Representation for Vmf {
     }
 
     fn pack(&self, sums: &Lobes, channels: &mut [f32]) {
-        channels
-            .as_chunks_mut()
-            .0
-            .iter_mut()
-            .zip(sums.all())
-            .for_each(|(rgba, lobe)| *rgba = Representation::store_lobe(self, lobe));
+        sums.map(|lobe| Representation::store_lobe(self, lobe)).to_channels(channels);
     }
 
-    /// From `alpha (1 - r.z)` to `alpha r.z`, where asked.
+    /// From `alpha (1 - r.z)` to `alpha r.z`, where asked; and back, since both are `alpha` less the other.
     fn store_lobe(&self, &[alpha, x, y, w]: &Four) -> Four {
         [alpha, x, y, if self.origin { alpha - w } else { w }]
     }
 
     fn unpack(&self, channels: &[f32]) -> Lobes {
-        let mut sums = self.zero();
-        for (j, &[alpha, x, y, w]) in
-            channels.as_chunks().0.iter().take(self.fit.lobes.min(MAX_LOBES)).enumerate()
-        {
-            sums.add(j, [alpha, x, y, if self.origin { alpha - w } else { w }], 1.0);
-        }
-        sums
+        Lobes::from_channels(self.fit.lobes, channels).map(|lobe| Representation::store_lobe(self, lobe))
     }
 
     fn decode(&self, sums: &Lobes) -> VmfMixture {
@@ -147,14 +135,12 @@ impl Representation for Vmf {
     }
 
     fn effective<'a>(&'a self, lobes: &VmfMixture, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        let widened: Vec<(f64, DVec3, Box<dyn Brdf>)> =
-            lobes.lobes.iter().map(|l| (l.weight, l.mean, brdf.widen(l.variance))).collect();
-        Box::new(move |w| widened.iter().map(|(weight, mu, lobe)| weight * lobe.evaluate(w.dot(*mu))).sum())
+        effective(&lobes.lobes, brdf, cosine)
     }
 
     fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
         let lobes = |channels: &[f32]| Self::lobes(&self.unpack(channels));
-        Box::new(MixtureEvaluator { lobes, cosine: |w: DVec3, mu: DVec3| w.dot(mu), brdf, directions })
+        Box::new(MixtureEvaluator { lobes, cosine, brdf, directions })
     }
 
     fn fit(&self) -> Option<Fit> {
