@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use crate::brdf::Brdf;
 use crate::error::Truth;
 use crate::grid::Size;
+use crate::lookup::{Tap, Texels};
 use crate::ndf::{Evaluator, Method};
 use crate::pyramid::{Pyramid, level_sizes};
 use crate::sphere::DiskLattice;
@@ -95,7 +96,7 @@ pub fn evaluate_neighbours(
 ) {
     out.fill(0.0);
     let mut one = vec![0.0; out.len()];
-    for n in pyramid.neighbours(uv, lod) {
+    for n in pyramid.neighbours(Tap { uv, lod }) {
         evaluator.evaluate(&pyramid.texel(n.level, n.x, n.y), &mut one);
         out.iter_mut().zip(&one).for_each(|(sum, f)| *sum += n.weight * f);
     }
@@ -115,6 +116,7 @@ pub fn filtering_error(
     let of_corner = |(corner, lobes): (&Corner, &[Vec<f64>; 4])| {
         let mut sums = [Squares::default(); 3];
         let mut out = vec![0.0; lattice.len()];
+        let mut channels = vec![0.0; pyramid.channels()];
         for ((x, y), lobe) in corner.iter().zip(lobes) {
             evaluator.evaluate(&pyramid.texel(level, *x, *y), &mut out);
             sums[0].add(&out, lobe);
@@ -130,7 +132,9 @@ pub fn filtering_error(
             evaluate_neighbours(pyramid, &*evaluator, (uv, level as f64), &mut out);
             sums[2].add(&out, &lobe);
             if method.filterable() {
-                evaluator.evaluate(&pyramid.bilinear(level, uv), &mut out);
+                channels.fill(0.0);
+                pyramid.bilinear(level, uv, 1.0, &mut channels);
+                evaluator.evaluate(&channels, &mut out);
             }
             sums[1].add(&out, &lobe);
         }

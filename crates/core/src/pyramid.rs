@@ -1,4 +1,4 @@
-//! Mip pyramids: sizes of the levels, the area each texel covers, storage, and filtered look-ups.
+//! Mip pyramids: sizes of the levels, the area each texel covers, and storage.
 //!
 //! Level `l` is `max(1, size >> l)` texels a side, as graphics APIs have it. Texel `i` of a level with
 //! `w` texels covers exactly `[i W/w, (i+1) W/w)` of the `W` finest texels, so where sizes are not
@@ -7,12 +7,12 @@
 use std::ops::Range;
 
 use fearless_simd::{Level, dispatch};
-use glam::DVec2;
 use half::f16;
 use half::slice::HalfFloatSliceExt;
 
 use crate::grid::Size;
-use crate::surface::{Wrap, Wraps};
+use crate::lookup::{Neighbour, Texels};
+use crate::surface::Wraps;
 
 /// Sizes of all levels, finest first, down to 1 × 1.
 #[must_use]
@@ -223,161 +223,32 @@ impl Pyramid {
         }
         channels
     }
-
-    /// The four texels around `uv` on one level, and what a bilinear filter weighs them.
-    fn around(&self, level: usize, uv: DVec2) -> [Neighbour; 4] {
-        let size = self.sizes[level];
-        let axis = |t: f64, n: usize, wrap: Wrap| {
-            let t = if t.is_finite() { t } else { 0.0 };
-            let at = match wrap {
-                Wrap::Repeat => t.rem_euclid(1.0),
-                Wrap::Clamp => t.clamp(0.0, 1.0),
-            } * n as f64
-                - 0.5;
-            let floor = at.floor();
-            let index = |d: isize| wrap.index(floor as isize + d, n);
-            [(index(0), 1.0 - (at - floor)), (index(1), at - floor)]
-        };
-        let columns = axis(uv.x, size.width, self.wraps.x);
-        let rows = axis(uv.y, size.height, self.wraps.y);
-        [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(j, i)| {
-            let ((y, wy), (x, wx)) = (rows[j], columns[i]);
-            Neighbour { level, x, y, weight: wx * wy }
-        })
-    }
-
-    /// The texels that a trilinear filter mixes at `uv` and `lod`, eight at most, and what it weighs them.
-    ///
-    /// What shades each and blends the results shows what filtering should have given, at several times the cost.
-    #[must_use]
-    pub fn neighbours(&self, uv: DVec2, lod: f64) -> Vec<Neighbour> {
-        let (level, t) = self.levels_of(lod);
-        let mut all = Vec::with_capacity(8);
-        for (level, share) in [(level, 1.0 - t), (level + 1, t)] {
-            if share > 0.0 {
-                let near = self.around(level, uv).into_iter();
-                all.extend(
-                    near.map(|n| Neighbour { weight: n.weight * share, ..n }).filter(|n| n.weight > 0.0),
-                );
-            }
-        }
-        all
-    }
-
-    /// The finer of the two levels at `lod`, and the share of the coarser.
-    fn levels_of(&self, lod: f64) -> (usize, f64) {
-        let last = self.sizes.len() - 1;
-        let lod = if lod.is_nan() { 0.0 } else { lod.clamp(0.0, last as f64) };
-        (lod.floor() as usize, lod - lod.floor())
-    }
-
-    /// Bilinear look-up on one level at `uv` (both 0..1 over the map, v down the rows).
-    #[must_use]
-    pub fn bilinear(&self, level: usize, uv: DVec2) -> Vec<f32> {
-        let mut sums = vec![0.0_f64; 4 * self.layers];
-        for n in self.around(level, uv).iter().filter(|n| n.weight > 0.0) {
-            for (sum, c) in sums.iter_mut().zip(self.texel(level, n.x, n.y)) {
-                *sum += n.weight * f64::from(c);
-            }
-        }
-        sums.into_iter().map(|s| s as f32).collect()
-    }
-
-    /// Trilinear look-up: `lod` 0 is the finest level, fractions mix two, beyond the ends is clamped.
-    #[must_use]
-    pub fn trilinear(&self, uv: DVec2, lod: f64) -> Vec<f32> {
-        let (level, t) = self.levels_of(lod);
-        let mut channels = self.bilinear(level, uv);
-        if t > 0.0 {
-            let t = t as f32;
-            for (c, coarse) in channels.iter_mut().zip(self.bilinear(level + 1, uv)) {
-                *c += t * (coarse - *c);
-            }
-        }
-        channels
-    }
-
-    /// Anisotropic look-up: the mean of up to `max_taps` trilinear taps along the longer axis of the
-    /// footprint, each at the level that the shorter axis asks for.
-    ///
-    /// The footprint is the ellipse whose axes come from the pixel's derivatives of `uv`; its
-    /// axes are found exactly (singular values of the 2×2 derivative), not guessed from the longer column.
-    #[must_use]
-    pub fn anisotropic(&self, footprint: &PixelFootprint, max_taps: usize) -> Vec<f32> {
-        let texels = DVec2::new(self.sizes[0].width as f64, self.sizes[0].height as f64);
-        let (dx, dy) = (footprint.duv_dx * texels, footprint.duv_dy * texels);
-        // Eigenvalues of J Jᵀ, whose ellipse is the image of the pixel's unit circle.
-        let (a, b, c) = (dx.x * dx.x + dy.x * dy.x, dx.x * dx.y + dy.x * dy.y, dx.y * dx.y + dy.y * dy.y);
-        let (mean, spread) = ((a + c) / 2.0, ((a - c) / 2.0).hypot(b));
-        let (major, minor) = ((mean + spread).sqrt(), (mean - spread).max(0.0).sqrt());
-        // The angle's own formula has no branch for a circle or an axis-aligned ellipse.
-        let angle = 0.5 * (2.0 * b).atan2(a - c);
-        let wanted = (major / minor.max(1.0)).ceil();
-        let taps = if wanted.is_finite() { wanted.clamp(1.0, max_taps.max(1) as f64) } else { 1.0 };
-        let lod = (major / taps).max(minor).max(1.0).log2();
-        let step = DVec2::from_angle(angle) * major / texels;
-        let mut sums = vec![0.0_f32; 4 * self.layers];
-        for tap in 0..taps as usize {
-            let t = (tap as f64 + 0.5) / taps - 0.5;
-            for (sum, c) in sums.iter_mut().zip(self.trilinear(footprint.uv + step * t, lod)) {
-                *sum += c / taps as f32;
-            }
-        }
-        sums
-    }
 }
 
-/// A texel that a filter reads.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Neighbour {
-    /// Its level.
-    pub level: usize,
-    /// Its column.
-    pub x: usize,
-    /// Its row.
-    pub y: usize,
-    /// Its share; shares sum to one.
-    pub weight: f64,
-}
+impl Texels for Pyramid {
+    fn sizes(&self) -> &[Size] {
+        &self.sizes
+    }
 
-/// Where a pixel falls on the map, and how far it reaches.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PixelFootprint {
-    /// Its centre, 0..1 over the map, v down the rows.
-    pub uv: DVec2,
-    /// Change of `uv` to the next pixel on the right.
-    pub duv_dx: DVec2,
-    /// Change of `uv` to the next pixel below.
-    pub duv_dy: DVec2,
+    fn wraps(&self) -> Wraps {
+        self.wraps
+    }
+
+    fn channels(&self) -> usize {
+        4 * self.layers
+    }
+
+    fn add(&self, place: Neighbour, sums: &mut [f32]) {
+        let weight = place.weight as f32;
+        for (sum, c) in sums.iter_mut().zip(self.texel(place.level, place.x, place.y)) {
+            *sum += weight * c;
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn ramp(size: Size, levels: usize) -> Pyramid {
-        // Every level holds u in red and v in green at the texels' centres, so linear look-ups are exact.
-        let layout = Layout {
-            size,
-            layers: 1,
-            precision: Precision::Single,
-            wraps: Wraps { x: Wrap::Clamp, y: Wrap::Clamp },
-        };
-        let level = |s: &Size| {
-            let mut values = Vec::new();
-            for y in 0..s.height {
-                for x in 0..s.width {
-                    let at =
-                        [(x as f32 + 0.5) / s.width as f32, (y as f32 + 0.5) / s.height as f32, 0.0, 1.0];
-                    values.extend(at);
-                }
-            }
-            let mut bytes = Vec::new();
-            assert_eq!(Precision::Single.pack(&values, &mut bytes), 0);
-            bytes
-        };
-        Pyramid::new(layout, level_sizes(size).iter().take(levels).map(level).collect()).unwrap()
-    }
 
     #[test]
     fn sizes_halve_downwards() {
@@ -411,80 +282,6 @@ mod tests {
         let mut back = Vec::new();
         Precision::Half.unpack(&bytes, &mut back);
         assert_eq!(back, [0.5, -2.0, 65504.0, f32::INFINITY]);
-    }
-
-    #[test]
-    fn linear_lookups_reproduce_a_ramp() {
-        let p = ramp(Size { width: 16, height: 16 }, 2);
-        for (uv, lod) in
-            [(DVec2::new(0.3, 0.6), 0.0), (DVec2::new(0.41, 0.52), 0.7), (DVec2::new(0.5, 0.5), 9.0)]
-        {
-            let c = p.trilinear(uv, lod);
-            // Single-precision centres: 2^-23.
-            assert!((f64::from(c[0]) - uv.x).abs() < 2e-7 && (f64::from(c[1]) - uv.y).abs() < 2e-7, "{c:?}");
-        }
-        let footprint = PixelFootprint {
-            uv: DVec2::new(0.5, 0.45),
-            duv_dx: DVec2::new(0.3, 0.1),
-            duv_dy: DVec2::new(0.0, 0.02),
-        };
-        let c = p.anisotropic(&footprint, 16);
-        assert!((f64::from(c[0]) - 0.5).abs() < 1e-6 && (f64::from(c[1]) - 0.45).abs() < 1e-6);
-    }
-
-    #[test]
-    fn neighbours_are_what_the_filter_mixes() {
-        let p = ramp(Size { width: 16, height: 8 }, 4);
-        for (uv, lod) in
-            [(DVec2::new(0.3, 0.6), 0.0), (DVec2::new(0.01, 0.99), 1.3), (DVec2::new(0.5, 0.25), 2.5)]
-        {
-            let near = p.neighbours(uv, lod);
-            assert!(near.len() <= 8 && (near.iter().map(|n| n.weight).sum::<f64>() - 1.0).abs() < 1e-12);
-            for (c, filtered) in p.trilinear(uv, lod).iter().enumerate() {
-                let mixed: f64 =
-                    near.iter().map(|n| n.weight * f64::from(p.texel(n.level, n.x, n.y)[c])).sum();
-                // The filter works in single floats.
-                assert!((mixed - f64::from(*filtered)).abs() < 1e-6);
-            }
-        }
-    }
-
-    #[test]
-    fn anisotropic_stays_sharper_than_trilinear_along_the_short_axis() {
-        // Vertical stripes, a pixel that is long along them: anisotropic look-ups must still see them.
-        let size = Size { width: 64, height: 64 };
-        let layout = Layout { size, layers: 1, precision: Precision::Single, wraps: Wraps::default() };
-        let stripes = |s: &Size, value: &dyn Fn(usize) -> f32| {
-            let row: Vec<f32> = (0..s.width).flat_map(|x| [value(x), 0.0, 0.0, 1.0]).collect();
-            let mut bytes = Vec::new();
-            Precision::Single.pack(&row.repeat(s.height), &mut bytes);
-            bytes
-        };
-        let levels = level_sizes(size);
-        let bytes = levels.iter().enumerate().map(|(l, s)| match l {
-            0 => stripes(s, &|x| (x / 2 % 2) as f32),
-            1 => stripes(s, &|x| (x % 2) as f32),
-            _ => stripes(s, &|_| 0.5),
-        });
-        let p = Pyramid::new(layout, bytes.collect()).unwrap();
-        let pixel = PixelFootprint {
-            uv: DVec2::new(3.0 / 64.0, 0.5),
-            duv_dx: DVec2::new(1.0 / 64.0, 0.0),
-            duv_dy: DVec2::new(0.0, 0.25),
-        };
-        assert!(p.anisotropic(&pixel, 16)[0] > 0.99);
-        assert!((p.anisotropic(&pixel, 1)[0] - 0.5).abs() < 1e-6);
-    }
-
-    #[test]
-    fn lookups_survive_nonsense() {
-        let p = ramp(Size { width: 4, height: 2 }, 3);
-        for bad in [f64::NAN, f64::INFINITY, -1e300] {
-            assert!(p.trilinear(DVec2::splat(bad), bad).iter().all(|c| c.is_finite()));
-            let pixel =
-                PixelFootprint { uv: DVec2::splat(bad), duv_dx: DVec2::splat(bad), duv_dy: DVec2::ZERO };
-            assert!(p.anisotropic(&pixel, 8).iter().all(|c| c.is_finite()));
-        }
     }
 
     #[test]

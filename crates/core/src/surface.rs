@@ -118,7 +118,7 @@ impl SurfaceRow {
 }
 
 /// The finest level of a map, read a row at a time so that no copy of it in floats need exist.
-pub trait Surface: Sync {
+pub trait Surface: Send + Sync {
     /// Width and height in texels.
     fn size(&self) -> Size;
 

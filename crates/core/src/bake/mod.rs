@@ -94,8 +94,14 @@ impl Bake<'_> {
     /// Bakes into memory.
     #[must_use]
     pub fn to_pyramid(&self) -> (Pyramid, BakeReport) {
-        let mut sink = MemorySink::new(self.layout());
-        let report = self.run(&mut sink).unwrap_or_else(|never| match never {});
+        self.to_pyramid_with(&[])
+    }
+
+    /// Bakes into memory with attributes; see [`Self::run_with`].
+    #[must_use]
+    pub fn to_pyramid_with(&self, attributes: &[Grid<Four>]) -> (Pyramid, BakeReport) {
+        let mut sink = MemorySink::new(self.layout_with(attributes.len()));
+        let report = self.run_with(attributes, &mut sink).unwrap_or_else(|never| match never {});
         (sink.finish(), report)
     }
 

@@ -21,6 +21,10 @@ impl Beckmann {
     pub fn new(alpha: Alpha) -> Self {
         Self { alpha_squared: alpha.get() * alpha.get() }
     }
+
+    fn widened(&self, by: SlopeVariance) -> Self {
+        Self { alpha_squared: self.alpha_squared + 2.0 * by.get() }
+    }
 }
 
 pub(super) const ROW: Row = Row {
@@ -58,6 +62,10 @@ impl Brdf for Beckmann {
     }
 
     fn widen(&self, by: SlopeVariance) -> Box<dyn Brdf> {
-        Box::new(Self { alpha_squared: self.alpha_squared + 2.0 * by.get() })
+        Box::new(self.widened(by))
+    }
+
+    fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64 {
+        self.widened(by).evaluate(u)
     }
 }

@@ -23,6 +23,14 @@ pub(super) const ROW: Row = Row {
     samples: &["blinn-phong:3", "blinn-phong:50", "blinn-phong:400.5"],
 };
 
+impl BlinnPhong {
+    fn widened(&self, by: SlopeVariance) -> Self {
+        let s = self.exponent.get();
+        let widened = (s / (1.0 + s * by.get())).max(1e-3);
+        Self { exponent: Exponent::new(widened).unwrap_or(self.exponent) }
+    }
+}
+
 impl Brdf for BlinnPhong {
     fn spelling(&self) -> String {
         format!("{}:{}", ROW.name, self.exponent)
@@ -54,9 +62,11 @@ impl Brdf for BlinnPhong {
     }
 
     fn widen(&self, by: SlopeVariance) -> Box<dyn Brdf> {
-        let s = self.exponent.get();
-        let widened = (s / (1.0 + s * by.get())).max(1e-3);
-        Box::new(Self { exponent: Exponent::new(widened).unwrap_or(self.exponent) })
+        Box::new(self.widened(by))
+    }
+
+    fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64 {
+        self.widened(by).evaluate(u)
     }
 
     fn zonal(&self, order: usize) -> Vec<f64> {

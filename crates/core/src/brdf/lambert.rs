@@ -18,6 +18,10 @@ pub struct Lambert {
 impl Lambert {
     /// Lambert's cosine.
     pub const SHARP: Self = Self { normals: SlopeVariance::ZERO };
+
+    fn widened(&self, by: SlopeVariance) -> Self {
+        Self { normals: self.normals.widen(by) }
+    }
 }
 
 pub(super) const ROW: Row = Row {
@@ -72,7 +76,11 @@ impl Brdf for Lambert {
     }
 
     fn widen(&self, by: SlopeVariance) -> Box<dyn Brdf> {
-        Box::new(Self { normals: self.normals.widen(by) })
+        Box::new(self.widened(by))
+    }
+
+    fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64 {
+        self.widened(by).evaluate(u)
     }
 
     fn zonal(&self, order: usize) -> Vec<f64> {

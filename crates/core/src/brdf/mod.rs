@@ -52,6 +52,9 @@ pub trait Brdf: Send + Sync + Debug {
     /// This lobe convolved with an isotropic lobe of normals of variance `by`; exactly itself for zero.
     fn widen(&self, by: SlopeVariance) -> Box<dyn Brdf>;
 
+    /// [`Self::widen`], then [`Self::evaluate`], without a lobe on the heap: what a pixel asks of a lobe, once.
+    fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64;
+
     /// Zonal coefficients `rho_l = 2 pi ∫ f(u) P_l(u) du` for l = 0..`order` (Han et al., equation 8).
     ///
     /// Closed forms or recurrences where there are any; else [`zonal_by_quadrature`].
@@ -209,6 +212,16 @@ mod tests {
             for u in [-0.2, 0.0, 0.3, 0.9, 0.999, 1.0] {
                 let (a, b) = (brdf.evaluate(u), same.evaluate(u));
                 assert!((a - b).abs() <= 1e-12 * a.abs(), "{} at {u}: {a} {b}", brdf.spelling());
+            }
+        }
+    }
+
+    #[test]
+    fn widening_in_passing_is_widening() {
+        let by = SlopeVariance::clamped(0.03);
+        for brdf in samples() {
+            for u in [-0.2, 0.3, 0.999] {
+                assert_eq!(brdf.evaluate_widened(by, u), brdf.widen(by).evaluate(u), "{}", brdf.spelling());
             }
         }
     }

@@ -21,6 +21,10 @@ impl TorranceSparrow {
     pub fn new(sigma: LobeAngle) -> Self {
         Self { sigma_squared: sigma.get() * sigma.get() }
     }
+
+    fn widened(&self, by: SlopeVariance) -> Self {
+        Self { sigma_squared: self.sigma_squared + by.get() / 2.0 }
+    }
 }
 
 pub(super) const ROW: Row = Row {
@@ -57,7 +61,11 @@ impl Brdf for TorranceSparrow {
     }
 
     fn widen(&self, by: SlopeVariance) -> Box<dyn Brdf> {
-        Box::new(Self { sigma_squared: self.sigma_squared + by.get() / 2.0 })
+        Box::new(self.widened(by))
+    }
+
+    fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64 {
+        self.widened(by).evaluate(u)
     }
 
     fn zonal_as_printed(&self, order: usize) -> Option<Vec<f64>> {

@@ -6,6 +6,7 @@
 
 use glam::{DVec2, DVec3, Vec2};
 
+use super::mixture::{Cosine, Shaded, cosine};
 use super::naive::UnitMean;
 use super::{Representation, Row, Sample, no_parameters};
 use crate::brdf::Brdf;
@@ -62,5 +63,9 @@ impl Representation for Fixed {
 
     fn effective<'a>(&'a self, lobes: &UnitMean, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         lobes.effective(brdf)
+    }
+
+    fn isotropic(&self, lobes: &UnitMean) -> Option<(Cosine, Vec<Shaded>)> {
+        Some((cosine, vec![lobes.alone()]))
     }
 }

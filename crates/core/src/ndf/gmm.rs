@@ -8,7 +8,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::mixture::{Lobes, MixtureEvaluator, Shaded, effective, parse_mixture};
+use super::mixture::{Cosine, Lobes, MixtureEvaluator, Shaded, effective, parse_mixture};
 use super::{Decoded, Evaluator, Method, PlanarLobe, Representation, Row, Sample};
 use crate::brdf::Brdf;
 use crate::fit::{Fit, Four, LobeKind};
@@ -130,6 +130,10 @@ impl Representation for Gmm {
         brdf: &'a dyn Brdf,
     ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         effective(&lobes.lobes, brdf, planar_cosine)
+    }
+
+    fn isotropic(&self, lobes: &GaussianMixture) -> Option<(Cosine, Vec<Shaded>)> {
+        Some((planar_cosine, lobes.lobes.clone()))
     }
 
     fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {

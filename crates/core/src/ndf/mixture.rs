@@ -81,6 +81,21 @@ pub struct Shaded {
     pub variance: SlopeVariance,
 }
 
+impl Shaded {
+    /// A lobe that is all of a texel.
+    pub(super) fn alone(mean: DVec3, variance: SlopeVariance) -> Self {
+        Self { layer: 0, weight: 1.0, mean, variance }
+    }
+
+    /// The unit direction of the mean: on the sphere the mean itself; a planar mean, whose z is 0, is lifted to it.
+    #[must_use]
+    pub fn direction(&self) -> DVec3 {
+        let DVec3 { x, y, z } = self.mean;
+        DVec3::new(x, y, if z == 0.0 { (1.0 - x * x - y * y).max(0.0).sqrt() } else { z })
+            .normalize_or(DVec3::Z)
+    }
+}
+
 /// Reads `J[:ALIGNMENT][:WORD]`; the second result says whether the word was there.
 pub(super) fn parse_mixture(
     words: &[&str],
@@ -127,7 +142,7 @@ pub(super) fn spell(name: &str, fit: &Fit, word: Option<&str>) -> String {
 }
 
 /// The BRDF's argument for a direction and a lobe's mean.
-pub(super) type Cosine = fn(DVec3, DVec3) -> f64;
+pub type Cosine = fn(DVec3, DVec3) -> f64;
 
 /// That of lobes on the sphere.
 pub(super) fn cosine(w: DVec3, mu: DVec3) -> f64 {

@@ -13,6 +13,7 @@ mod mixture;
 mod naive;
 mod ndm;
 mod phong;
+mod reflect;
 mod sh;
 mod slopes;
 mod toksvig;
@@ -23,10 +24,11 @@ mod conformance;
 
 pub use fixed::Fixed;
 pub use gmm::{GaussianMixture, Gmm};
-pub use mixture::{Lobes, Shaded};
+pub use mixture::{Cosine, Lobes, Shaded};
 pub use naive::Naive;
 pub use ndm::{Kernel, Ndm, Normalisation};
 pub use phong::{Phong, PhongPeaks};
+pub use reflect::{Filtered, Lit};
 pub use sh::{Coefficients, Sh};
 pub use slopes::{SlopeGaussian, SlopeMoments, Slopes};
 pub use toksvig::{Lobe, Toksvig};
@@ -38,6 +40,7 @@ use glam::{DMat3, DVec2, DVec3, Vec3};
 
 use crate::brdf::Brdf;
 use crate::fit::{Fit, Four};
+use crate::reflection::Reflection;
 use crate::surface::SurfaceRow;
 
 /// One fine texel, as a representation sees it.
@@ -87,6 +90,11 @@ pub trait Representation: Debug + Send + Sync {
 
     /// The effective lobe `w ↦ ∫ f(w·n) gamma(n) dn` under this distribution.
     fn effective<'a>(&'a self, lobes: &Self::Lobes, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a>;
+
+    /// The distribution as a sum of isotropic lobes, and the cosine that they are a function of, where it is one.
+    fn isotropic(&self, _lobes: &Self::Lobes) -> Option<(Cosine, Vec<Shaded>)> {
+        None
+    }
 
     /// Sets channels that are computed from the filtered sums and are no sums themselves.
     fn finish(&self, _channels: &mut [f32]) {}
@@ -253,6 +261,9 @@ pub trait Method: Debug + Send + Sync {
     /// An evaluator for one BRDF at fixed directions.
     fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a>;
 
+    /// The light that a texel with these filtered channels sends to the eye; see [`Filtered`].
+    fn reflect(&self, texel: &Filtered<'_>, reflection: &Reflection, lights: &[Lit]) -> DVec3;
+
     /// What it makes of a flat map.
     fn flat_lobe(&self, brdf: &dyn Brdf) -> FlatLobe;
 
@@ -307,6 +318,10 @@ impl<R: Representation> Method for R {
 
     fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
         Representation::evaluator(self, brdf, directions)
+    }
+
+    fn reflect(&self, texel: &Filtered<'_>, reflection: &Reflection, lights: &[Lit]) -> DVec3 {
+        reflect::reflect(self, texel, reflection, lights)
     }
 
     fn flat_lobe(&self, brdf: &dyn Brdf) -> FlatLobe {

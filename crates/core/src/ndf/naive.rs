@@ -5,8 +5,10 @@
 
 use glam::{DVec3, Vec3};
 
+use super::mixture::{Cosine, Shaded, cosine};
 use super::{Decoded, Representation, Row, Sample, direction_or_up, no_parameters};
 use crate::brdf::Brdf;
+use crate::units::SlopeVariance;
 
 /// Normalised mip-mapping.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +33,11 @@ impl UnitMean {
     /// The direction of `v`; `(0,0,1)` when it has none.
     pub(super) fn new(v: DVec3) -> Self {
         Self { direction: direction_or_up(v) }
+    }
+
+    /// The direction as a lobe without spread.
+    pub(super) fn alone(&self) -> Shaded {
+        Shaded::alone(self.direction, SlopeVariance::ZERO)
     }
 
     /// The lobe itself, around the direction.
@@ -84,5 +91,9 @@ impl Representation for Naive {
 
     fn effective<'a>(&'a self, lobes: &UnitMean, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         lobes.effective(brdf)
+    }
+
+    fn isotropic(&self, lobes: &UnitMean) -> Option<(Cosine, Vec<Shaded>)> {
+        Some((cosine, vec![lobes.alone()]))
     }
 }

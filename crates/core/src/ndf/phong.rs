@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::mixture::{Lobes, MixtureEvaluator, Shaded, cosine, effective};
+use super::mixture::{Cosine, Lobes, MixtureEvaluator, Shaded, cosine, effective};
 use super::{Decoded, Evaluator, Method, MixtureLobe, Representation, Row, Sample};
 use crate::brdf::Brdf;
 use crate::fit::{Alignment, Fit, Four, LobeKind, MAX_LOBES, SHARPEST};
@@ -115,6 +115,10 @@ impl Representation for Phong {
 
     fn effective<'a>(&'a self, peaks: &PhongPeaks, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         effective(&peaks.peaks, brdf, cosine)
+    }
+
+    fn isotropic(&self, lobes: &PhongPeaks) -> Option<(Cosine, Vec<Shaded>)> {
+        Some((cosine, lobes.peaks.clone()))
     }
 
     fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {

@@ -6,6 +6,7 @@
 
 use glam::{DVec3, Vec3};
 
+use super::mixture::{Cosine, Shaded, cosine};
 use super::{Decoded, Representation, Row, Sample, direction_or_up, no_parameters};
 use crate::brdf::Brdf;
 use crate::units::SlopeVariance;
@@ -83,6 +84,10 @@ impl Representation for Toksvig {
     fn effective<'a>(&'a self, lobes: &Lobe, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         let (mu, widened) = (direction_or_up(lobes.mean), brdf.widen(lobes.variance));
         Box::new(move |w| widened.evaluate(w.dot(mu)))
+    }
+
+    fn isotropic(&self, lobes: &Lobe) -> Option<(Cosine, Vec<Shaded>)> {
+        Some((cosine, vec![Shaded::alone(direction_or_up(lobes.mean), lobes.variance)]))
     }
 }
 

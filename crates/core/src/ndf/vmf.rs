@@ -10,7 +10,7 @@
 
 use glam::DVec3;
 
-use super::mixture::{Lobes, MixtureEvaluator, Shaded, cosine, effective, parse_mixture};
+use super::mixture::{Cosine, Lobes, MixtureEvaluator, Shaded, cosine, effective, parse_mixture};
 use super::{Decoded, Evaluator, Method, MixtureLobe, Representation, Row, Sample};
 use crate::brdf::Brdf;
 use crate::fit::{Fit, Four, LobeKind, from_pole};
@@ -136,6 +136,10 @@ impl Representation for Vmf {
 
     fn effective<'a>(&'a self, lobes: &VmfMixture, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         effective(&lobes.lobes, brdf, cosine)
+    }
+
+    fn isotropic(&self, lobes: &VmfMixture) -> Option<(Cosine, Vec<Shaded>)> {
+        Some((cosine, lobes.lobes.clone()))
     }
 
     fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {

@@ -10,6 +10,7 @@ mod foil;
 mod noise;
 mod ripples;
 mod v_groove;
+mod weave;
 
 pub use noise::gaussian_noise;
 pub use v_groove::GROOVE_SLOPE;
@@ -28,8 +29,16 @@ pub struct Row {
 }
 
 /// Every built-in surface.
-pub static TABLE: &[Row] =
-    &[carved_disk::ROW, armour::ROW, dunes::ROW, v_groove::ROW, ripples::ROW, foil::ROW, noise::ROW];
+pub static TABLE: &[Row] = &[
+    carved_disk::ROW,
+    armour::ROW,
+    dunes::ROW,
+    v_groove::ROW,
+    ripples::ROW,
+    foil::ROW,
+    noise::ROW,
+    weave::ROW,
+];
 
 /// The row of this name.
 #[must_use]

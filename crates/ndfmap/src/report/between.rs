@@ -7,6 +7,7 @@ use ndfmap_core::brdf;
 use ndfmap_core::error::Truth;
 use ndfmap_core::filtering::evaluate_neighbours;
 use ndfmap_core::fit::{Alignment, LobeKind};
+use ndfmap_core::lookup::{Tap, Texels};
 use ndfmap_core::ndf::{self, Method};
 use ndfmap_core::pyramid::Pyramid;
 use ndfmap_core::sphere::DiskLattice;
@@ -41,7 +42,7 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Option<Can
         canvas.text(label + column * step_x, 8, title);
     }
     let mut histogram = vec![0.0; lattice.len()];
-    for n in rows[0].row.pyramid.neighbours(place, level as f64) {
+    for n in rows[0].row.pyramid.neighbours(Tap { uv: place, lod: level as f64 }) {
         let lobe = truth.texel(size, n.x, n.y);
         histogram.iter_mut().zip(lobe).for_each(|(sum, f)| *sum += n.weight * f);
     }
@@ -59,7 +60,9 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Option<Can
         let (apart, _) = bake.to_pyramid();
         let filtered = |pyramid: &Pyramid, method: &dyn Method| {
             let mut out = vec![0.0; lattice.len()];
-            method.evaluator(&*pen, &lattice.directions).evaluate(&pyramid.bilinear(level, place), &mut out);
+            let mut channels = vec![0.0; pyramid.channels()];
+            pyramid.bilinear(level, place, 1.0, &mut channels);
+            method.evaluator(&*pen, &lattice.directions).evaluate(&channels, &mut out);
             out
         };
         let mut shaded = vec![0.0; lattice.len()];

@@ -1,0 +1,38 @@
+//! Lights without extent.
+
+use glam::DVec3;
+
+/// A light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Light {
+    /// One so far away that all see it in the same direction.
+    Directional {
+        /// Unit vector to the light.
+        towards: DVec3,
+        /// Irradiance on a plane that faces it, linear RGB.
+        irradiance: DVec3,
+    },
+    /// One at a place.
+    Point {
+        /// Where it is.
+        at: DVec3,
+        /// Radiant intensity, linear RGB: irradiance at distance 1.
+        intensity: DVec3,
+    },
+}
+
+impl Light {
+    /// Unit vector from `place` to the light, and its irradiance there on a plane that faces it.
+    #[must_use]
+    pub fn seen_from(&self, place: DVec3) -> (DVec3, DVec3) {
+        match *self {
+            Self::Directional { towards, irradiance } => (towards, irradiance),
+            Self::Point { at, intensity } => {
+                let way = at - place;
+                // A light that touches a surface would be infinitely bright there.
+                let square = way.length_squared().max(1e-12);
+                (way / square.sqrt(), intensity / square)
+            }
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! Scenes as data: a camera, meshes with materials, lights. And the table of built-in ones.
+//!
+//! World: right-handed, y up, no unit. A scene that moves is a function of time, 0 to 1; nothing else is kept between frames.
+//! [`TABLE`] has one row for each built-in scene, and a row buys the tests at the end of this file.
+
+mod armour;
+mod camera;
+mod cloth;
+mod creature;
+mod desert;
+mod disk;
+mod foil;
+mod material;
+mod mesh;
+mod plane;
+mod sphere;
+mod v_groove;
+
+pub use camera::{Camera, Rays};
+pub use material::{FinishMap, Material};
+pub use mesh::{Mesh, Vertex};
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+
+use crate::brdf::{self, Argument, Brdf};
+use crate::grid::Size;
+use crate::light::Light;
+use crate::procedural;
+use crate::reflection::{Model, Reflection};
+use crate::surface::Surface;
+
+/// A mesh of one material.
+#[derive(Clone, Debug)]
+pub struct Object {
+    /// Its shape.
+    pub mesh: Arc<Mesh>,
+    /// Index into the scene's materials.
+    pub material: usize,
+}
+
+/// All that a picture shows.
+pub struct Scene {
+    /// Where it is seen from.
+    pub camera: Camera,
+    /// What is seen.
+    pub objects: Vec<Object>,
+    /// What it is made of.
+    pub materials: Vec<Material>,
+    /// What it is lit by.
+    pub lights: Vec<Light>,
+    /// Radiance where nothing is hit, linear RGB.
+    pub background: Vec3,
+    /// Display values are sRGB of radiance times this.
+    pub exposure: f32,
+}
+
+/// How a built-in scene is to be set up.
+#[derive(Clone)]
+pub struct Staging {
+    /// Time, 0 to 1.
+    pub time: f64,
+    /// Size of built-in maps.
+    pub map_size: Size,
+    /// A map for the scene's first material, in place of its own.
+    pub map: Option<Arc<dyn Surface>>,
+}
+
+impl Default for Staging {
+    fn default() -> Self {
+        Self { time: 0.0, map_size: Size { width: 512, height: 512 }, map: None }
+    }
+}
+
+impl Staging {
+    /// The map of the first material: the one given, or a built-in one.
+    fn first_map(&self, own: &str) -> Arc<dyn Surface> {
+        self.map.clone().unwrap_or_else(|| self.builtin(own))
+    }
+
+    /// A built-in map.
+    fn builtin(&self, name: &str) -> Arc<dyn Surface> {
+        let row = procedural::find(name).unwrap_or_else(|| unreachable!("{name} is a row of the table"));
+        Arc::from((row.build)(self.map_size))
+    }
+}
+
+/// A row of [`TABLE`].
+pub struct Row {
+    /// Its name on the command line.
+    pub name: &'static str,
+    /// One line for help and docs.
+    pub summary: &'static str,
+    /// What moves as time goes from 0 to 1.
+    pub animation: &'static str,
+    /// Sets it up.
+    pub build: fn(&Staging) -> Scene,
+}
+
+/// Every built-in scene.
+pub static TABLE: &[Row] = &[
+    plane::ROW,
+    disk::ROW,
+    disk::OBLIQUE,
+    armour::ROW,
+    desert::ROW,
+    sphere::ROW,
+    v_groove::ROW,
+    foil::ROW,
+    creature::ROW,
+    cloth::ROW,
+];
+
+/// The row of this name.
+#[must_use]
+pub fn find(name: &str) -> Option<&'static Row> {
+    TABLE.iter().find(|row| row.name == name)
+}
+
+impl Scene {
+    /// Gives every material this lobe. A diffuse one leaves no highlight: what was specular colour becomes albedo.
+    ///
+    /// # Errors
+    /// [`brdf::ParseBrdfError`] for a spelling that names none.
+    pub fn set_brdf(&mut self, spelling: &str) -> Result<(), brdf::ParseBrdfError> {
+        for material in &mut self.materials {
+            material.reflection.lobe = brdf::parse(spelling)?;
+            if material.reflection.lobe.argument() == Argument::Light {
+                material.finish.diffuse = material.finish.diffuse.max(material.finish.specular);
+            }
+        }
+        Ok(())
+    }
+
+    /// Gives every material this shading model.
+    pub fn set_model(&mut self, model: Model) {
+        self.materials.iter_mut().for_each(|m| m.reflection.model = model);
+    }
+
+    /// The smallest sphere around the middle of the scene's bounds that holds it: centre and radius.
+    #[must_use]
+    pub fn bounds(&self) -> (DVec3, f64) {
+        let places = || self.objects.iter().flat_map(|o| &o.mesh.vertices).map(|v| v.position);
+        let low = places().fold(Vec3::INFINITY, Vec3::min).as_dvec3();
+        let high = places().fold(Vec3::NEG_INFINITY, Vec3::max).as_dvec3();
+        if low.x > high.x { (DVec3::ZERO, 1.0) } else { ((low + high) / 2.0, (high - low).length() / 2.0) }
+    }
+}
+
+/// A light far away, from a direction that need not be of unit length.
+fn sun(towards: [f64; 3], irradiance: [f64; 3]) -> Light {
+    Light::Directional { towards: DVec3::from(towards).normalize(), irradiance: irradiance.into() }
+}
+
+/// A lobe in a model, for the scenes' own spellings.
+fn reflection(model: Model, lobe: &str) -> Reflection {
+    let lobe: Box<dyn Brdf> = brdf::parse(lobe).unwrap_or_else(|e| unreachable!("{e}"));
+    Reflection { lobe, model }
+}
+
+/// From `a` to `b` by equal factors, as time goes from 0 to 1.
+fn zoom(a: f64, b: f64, time: f64) -> f64 {
+    a * (b / a).powf(time)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scenes() -> impl Iterator<Item = (&'static Row, f64, Scene)> {
+        let staging = |time| Staging { time, map_size: Size { width: 16, height: 16 }, map: None };
+        TABLE.iter().flat_map(move |row| [0.0, 0.6, 1.0].map(|time| (row, time, (row.build)(&staging(time)))))
+    }
+
+    #[test]
+    fn scenes_are_whole() {
+        for (row, time, scene) in scenes() {
+            let name = format!("{} at {time}", row.name);
+            assert!(!scene.objects.is_empty() && !scene.lights.is_empty() && scene.exposure > 0.0, "{name}");
+            for object in &scene.objects {
+                assert!(object.material < scene.materials.len(), "{name}");
+                let vertices = &object.mesh.vertices;
+                assert!(
+                    object.mesh.triangles.iter().flatten().all(|i| (*i as usize) < vertices.len()),
+                    "{name}"
+                );
+                for v in vertices {
+                    let (n, t) = (v.normal, v.tangent.truncate());
+                    let finite = v.position.is_finite() && v.uv.is_finite();
+                    assert!(finite && (n.length() - 1.0).abs() < 1e-4, "{name}: {v:?}");
+                    assert!((t.length() - 1.0).abs() < 1e-4 && v.tangent.w.abs() == 1.0, "{name}: {v:?}");
+                }
+            }
+            assert!(scene.camera.eye.distance(scene.camera.target) > 0.0, "{name}");
+        }
+    }
+
+    #[test]
+    fn tangents_follow_the_maps() {
+        // Along a triangle's u the position moves with the tangent, and against v (v runs down) with the bitangent.
+        for (row, _, scene) in scenes() {
+            for object in &scene.objects {
+                let mesh = &object.mesh;
+                let (mut agree, mut all) = (0, 0);
+                for t in &mesh.triangles {
+                    let [a, b, c] = t.map(|i| mesh.vertices[i as usize]);
+                    let (p, q) = (b.position - a.position, c.position - a.position);
+                    let (s, t) = (b.uv - a.uv, c.uv - a.uv);
+                    let determinant = s.perp_dot(t);
+                    if determinant.abs() < 1e-12 || p.cross(q).length() < 1e-12 {
+                        continue;
+                    }
+                    let du = (p * t.y - q * s.y) / determinant;
+                    let up = -(q * s.x - p * t.x) / determinant;
+                    let bitangent = a.normal.cross(a.tangent.truncate()) * a.tangent.w;
+                    all += 1;
+                    agree += usize::from(du.dot(a.tangent.truncate()) > 0.0 && up.dot(bitangent) > 0.0);
+                }
+                // Poles and folds aside.
+                assert!(agree as f64 > 0.97 * f64::from(all), "{}: {agree} of {all}", row.name);
+            }
+        }
+    }
+
+    #[test]
+    fn faces_are_seen_from_outside() {
+        for (row, _, scene) in scenes() {
+            for object in &scene.objects {
+                let mesh = &object.mesh;
+                let outward = mesh.triangles.iter().filter(|t| {
+                    let [a, b, c] = t.map(|i| mesh.vertices[i as usize]);
+                    let normal = (b.position - a.position).cross(c.position - a.position);
+                    normal.dot(a.normal + b.normal + c.normal) >= 0.0
+                });
+                assert!(outward.count() as f64 > 0.97 * mesh.triangles.len() as f64, "{}", row.name);
+            }
+        }
+    }
+}

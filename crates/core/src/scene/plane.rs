@@ -1,0 +1,41 @@
+//! A plane to the horizon, any map on it, the light ahead: the view in which normal maps sparkle.
+
+use glam::{DVec2, DVec3, Vec3};
+
+use super::{Camera, Material, Mesh, Object, Row, Scene, Staging, reflection, sun};
+use crate::reflection::{Finish, Model};
+use crate::units::SlopeVariance;
+
+/// Half of the plane's side; the map covers two by two.
+const HALF: f64 = 60.0;
+
+fn build(staging: &Staging) -> Scene {
+    let place = |s: f64, t: f64| DVec3::new((2.0 * s - 1.0) * HALF, 0.0, (1.0 - 2.0 * t) * HALF);
+    let mesh = Mesh::from_patch((1, 1), DVec2::splat(HALF), place);
+    let ahead = 4.0 * staging.time;
+    Scene {
+        camera: Camera::new([0.3, 1.1, 8.0 - ahead], [0.3, -0.35, 4.0 - ahead], 50.0),
+        objects: vec![Object { mesh: mesh.into(), material: 0 }],
+        materials: vec![Material {
+            name: "plane".to_owned(),
+            surface: staging.first_map("foil"),
+            finish: Finish {
+                diffuse: DVec3::new(0.2, 0.25, 0.32),
+                specular: DVec3::splat(0.06),
+                gloss: SlopeVariance::ZERO,
+            },
+            finish_map: None,
+            reflection: reflection(Model::Smith, "beckmann:0.15"),
+        }],
+        lights: vec![sun([0.1, 0.45, -1.0], [1.6, 1.5, 1.35])],
+        background: Vec3::new(0.02, 0.03, 0.05),
+        exposure: 1.0,
+    }
+}
+
+pub(super) const ROW: Row = Row {
+    name: "plane",
+    summary: "any map on a plane to the horizon, the sun ahead",
+    animation: "the camera glides forward",
+    build,
+};

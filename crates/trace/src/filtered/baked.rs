@@ -1,0 +1,112 @@
+//! A baked material: look-ups of its map's channels and of what it is made of.
+
+use glam::DVec3;
+use ndfmap_core::bake::Bake;
+use ndfmap_core::fit::Four;
+use ndfmap_core::grid::Grid;
+use ndfmap_core::lookup::{Lookup, PixelFootprint, Texels};
+use ndfmap_core::ndf::{Filtered, Lit, Method};
+use ndfmap_core::pyramid::Precision;
+use ndfmap_core::reflection::Finish;
+use ndfmap_core::scene::Material;
+use ndfmap_core::units::SlopeVariance;
+
+use super::Lookups;
+
+/// What a bake makes of one material. Lights, BRDFs and models come in when shading.
+pub(super) struct Baked {
+    map: Lookup,
+    /// Layers of the method itself; those of attributes follow.
+    layers: usize,
+    /// Colours and gloss, for methods whose lobes carry none.
+    finish: Vec<Lookup>,
+}
+
+impl Baked {
+    /// Bakes the map, with the finish in the lobes where the method has lobes that can carry it.
+    pub(super) fn new(
+        material: &Material,
+        method: &dyn Method,
+        precision: Precision,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Self {
+        let surface = &*material.surface;
+        let bake = Bake { surface, method, precision, progress };
+        let carried: Vec<Grid<Four>> = match &material.finish_map {
+            Some(map) => {
+                std::iter::once(&map.diffuse_gloss).chain(&map.specular).map(|g| (**g).clone()).collect()
+            }
+            None => Vec::new(),
+        };
+        let fitted = method.fit().is_some();
+        let (pyramid, _) = if fitted { bake.to_pyramid_with(&carried) } else { bake.to_pyramid() };
+        let finish = if fitted { &[][..] } else { &carried };
+        Self {
+            map: Lookup::new(&pyramid),
+            layers: method.layers(),
+            finish: finish.iter().map(|values| Lookup::of_values(values, surface.wraps())).collect(),
+        }
+    }
+
+    /// Light that the pixel sends to the eye.
+    pub(super) fn shade(
+        &self,
+        (material, method): (&Material, &dyn Method),
+        pixel: &PixelFootprint,
+        lookups: Lookups,
+        (channels, lights): (&mut Vec<f32>, &[Lit]),
+    ) -> DVec3 {
+        let filtering = lookups.filtering;
+        let mut colours = [[0.0; 4]; 2];
+        for (lookup, colour) in self.finish.iter().zip(&mut colours) {
+            lookup.filtered(pixel, filtering, colour);
+        }
+        if lookups.neighbours || !method.filterable() {
+            let (count, taps) = self.map.taps(pixel, filtering);
+            let mut sum = DVec3::ZERO;
+            for n in taps.flat_map(|tap| self.map.neighbours(tap)) {
+                let texel = self.map.texel(n.level, n.x, n.y);
+                sum += n.weight * self.reflect((material, method), (texel, &colours), lookups, lights);
+            }
+            return sum / count as f64;
+        }
+        channels.resize(self.map.channels(), 0.0);
+        self.map.filtered(pixel, filtering, channels);
+        self.reflect((material, method), (channels, &colours), lookups, lights)
+    }
+
+    fn reflect(
+        &self,
+        (material, method): (&Material, &dyn Method),
+        (channels, colours): (&[f32], &[[f32; 4]; 2]),
+        lookups: Lookups,
+        lights: &[Lit],
+    ) -> DVec3 {
+        let finish = |layer: Option<usize>| match (&material.finish_map, layer) {
+            (None, _) => material.finish,
+            (Some(_), Some(layer)) if self.finish.is_empty() => {
+                // A lobe's attributes are stored times its weight.
+                let weight = channels[4 * layer].max(f32::MIN_POSITIVE);
+                let attribute = |k: usize| {
+                    let from = 4 * ((k + 1) * self.layers + layer);
+                    channels.get(from..from + 4).map(|c| [0, 1, 2, 3].map(|i| c[i] / weight))
+                };
+                finish_of(material, attribute(0).unwrap_or_default(), attribute(1))
+            }
+            (Some(_), _) => finish_of(material, colours[0], (self.finish.len() > 1).then_some(colours[1])),
+        };
+        let texel =
+            Filtered { channels: &channels[..4 * self.layers], finish: &finish, at_means: lookups.at_means };
+        method.reflect(&texel, &material.reflection, lights)
+    }
+}
+
+/// A finish from its channels.
+fn finish_of(material: &Material, [r, g, b, gloss]: [f32; 4], specular: Option<[f32; 4]>) -> Finish {
+    let colour = |[r, g, b]: [f32; 3]| DVec3::new(r.into(), g.into(), b.into());
+    Finish {
+        diffuse: colour([r, g, b]),
+        specular: specular.map_or(material.finish.specular, |[r, g, b, _]| colour([r, g, b])),
+        gloss: SlopeVariance::clamped(gloss.into()),
+    }
+}

@@ -1,0 +1,169 @@
+//! Shading through a representation: one look-up a pixel, as wide as the pixel's reach on the map.
+//!
+//! Where outlines cross a pixel, and only there, it is cut into 4 × 4 parts that are shaded apart, each at its own reach,
+//! as a rasteriser's multisampling would have it: what is measured is the filtering of maps, not of outlines.
+
+mod baked;
+
+use glam::{DVec2, DVec3};
+use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::lookup::{Filtering, PixelFootprint};
+use ndfmap_core::metrics::Picture;
+use ndfmap_core::ndf::{Lit, Method};
+use ndfmap_core::pyramid::Precision;
+use ndfmap_core::scene::{Camera, Material, Rays, Scene};
+use rayon::prelude::*;
+
+use self::baked::Baked;
+use crate::geometry::{Geometry, Hit, Place};
+use crate::ways;
+
+/// How maps are looked up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lookups {
+    /// Width of the filter.
+    pub filtering: Filtering,
+    /// Shade every texel that the filter reads and mix the results: the reference for lobes that are not aligned, and the
+    /// only way for what cannot be filtered, which takes it unasked.
+    pub neighbours: bool,
+    /// Take factors at the lobes' means, as the papers print it.
+    pub at_means: bool,
+}
+
+impl Lookups {
+    /// One trilinear tap.
+    pub const TRILINEAR: Self = Self { filtering: Filtering::TRILINEAR, neighbours: false, at_means: false };
+}
+
+/// Parts that a pixel with an outline in it is cut into, on each axis.
+const PARTS: usize = 4;
+
+/// The maps of a scene's materials, baked with one method. Camera, lights, BRDFs, models and meshes may change after.
+pub struct BakedMaps<'a> {
+    method: &'a dyn Method,
+    materials: Vec<Baked>,
+}
+
+impl<'a> BakedMaps<'a> {
+    /// Bakes every material's map; `progress` is told the fraction done.
+    #[must_use]
+    pub fn new(
+        materials: &[Material],
+        method: &'a dyn Method,
+        precision: Precision,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Self {
+        let count = materials.len() as f64;
+        let bake =
+            |(i, material)| Baked::new(material, method, precision, &|f| progress((i as f64 + f) / count));
+        Self { method, materials: materials.iter().enumerate().map(bake).collect() }
+    }
+}
+
+/// A scene that is rendered through baked maps.
+pub struct Filtered<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its triangles.
+    pub geometry: &'a Geometry,
+    /// Its maps.
+    pub maps: &'a BakedMaps<'a>,
+}
+
+/// Room for a pixel's channels.
+struct Scratch {
+    channels: Vec<f32>,
+    lights: Vec<Lit>,
+}
+
+impl Filtered<'_> {
+    /// Renders a picture.
+    #[must_use]
+    pub fn render(&self, camera: &Camera, size: Size, lookups: Lookups) -> Picture {
+        let rays = camera.rays(size);
+        let centre = |i: usize| DVec2::new((i % size.width) as f64 + 0.5, (i / size.width) as f64 + 0.5);
+        let hits: Vec<Option<(Hit, Place)>> =
+            (0..size.area()).into_par_iter().map(|i| self.look(&rays, centre(i))).collect();
+        let rows = (0..size.height).into_par_iter().map_init(
+            || Scratch { channels: Vec::new(), lights: Vec::new() },
+            |scratch, y| {
+                let mut row = Vec::with_capacity(size.width);
+                for i in y * size.width..(y + 1) * size.width {
+                    let colour = if outline(&hits, size, i) {
+                        self.parts(&rays, centre(i), lookups, scratch)
+                    } else {
+                        self.shade(&rays, hits[i].as_ref(), (centre(i), 1.0), (lookups, scratch))
+                    };
+                    row.push(colour.as_vec3());
+                }
+                row
+            },
+        );
+        let pixels: Vec<glam::Vec3> = rows.flatten_iter().collect();
+        Grid::from_vec(size, pixels).unwrap_or_else(|| unreachable!("one colour a pixel"))
+    }
+
+    fn look(&self, rays: &Rays, at: DVec2) -> Option<(Hit, Place)> {
+        let hit = self.geometry.hit(rays.eye, rays.direction(at))?;
+        Some((hit, self.geometry.place(&hit)))
+    }
+
+    /// A pixel as the mean of its parts.
+    fn parts(&self, rays: &Rays, centre: DVec2, lookups: Lookups, scratch: &mut Scratch) -> DVec3 {
+        let mut sum = DVec3::ZERO;
+        for i in 0..PARTS * PARTS {
+            let part = DVec2::new((i % PARTS) as f64, (i / PARTS) as f64);
+            let at = centre + (part + 0.5) / PARTS as f64 - 0.5;
+            let hit = self.look(rays, at);
+            sum += self.shade(rays, hit.as_ref(), (at, 1.0 / PARTS as f64), (lookups, scratch));
+        }
+        sum / (PARTS * PARTS) as f64
+    }
+
+    /// Light that comes from a hit (or from where nothing is hit), for a pixel at `at` that is `width` pixels wide.
+    fn shade(
+        &self,
+        rays: &Rays,
+        hit: Option<&(Hit, Place)>,
+        (at, width): (DVec2, f64),
+        (lookups, scratch): (Lookups, &mut Scratch),
+    ) -> DVec3 {
+        let Some((hit, place)) = hit else { return self.scene.background.as_dvec3() };
+        let wo = place.frame.transpose() * -rays.direction(at);
+        scratch.lights.clear();
+        let lit = ways(&self.scene.lights, (place.position, place.frame), wo);
+        scratch.lights.extend(lit.map(|(way, irradiance)| Lit { way, irradiance }));
+        if scratch.lights.is_empty() {
+            return DVec3::ZERO;
+        }
+        let [dx, dy] = self.geometry.differentials(hit, place, rays, at);
+        let pixel = PixelFootprint { uv: place.uv, duv_dx: dx * width, duv_dy: dy * width };
+        let material = (&self.scene.materials[place.material], self.maps.method);
+        self.maps.materials[place.material].shade(
+            material,
+            &pixel,
+            lookups,
+            (&mut scratch.channels, &scratch.lights),
+        )
+    }
+}
+
+/// True where the pixels around a pixel show something else than its own surface goes on to.
+fn outline(hits: &[Option<(Hit, Place)>], size: Size, i: usize) -> bool {
+    let (x, y) = (i % size.width, i / size.width);
+    let around = [
+        (x > 0).then(|| i - 1),
+        (x + 1 < size.width).then(|| i + 1),
+        (y > 0).then(|| i - size.width),
+        (y + 1 < size.height).then(|| i + size.width),
+    ];
+    around.into_iter().flatten().any(|j| match (&hits[i], &hits[j]) {
+        (None, None) => false,
+        (Some((hit, a)), Some((_, b))) => {
+            // Off the plane of the face by more than a twentieth of the distance, or turned by more than 60 degrees.
+            let off = (b.position - a.position).dot(a.face).abs() > 0.05 * hit.distance;
+            a.object != b.object || off || a.face.dot(b.face) < 0.5
+        }
+        _ => true,
+    })
+}

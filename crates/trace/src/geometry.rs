@@ -1,0 +1,171 @@
+//! What rays hit: all triangles of a scene in one hierarchy, and the place they are hit in.
+
+use std::time::Duration;
+
+use glam::{DMat3, DVec2, DVec3, Vec3A};
+use ndfmap_core::scene::{Rays, Scene, Vertex};
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::cwbvh::{CwBvh, builder::build_cwbvh};
+use obvhs::ray::{Ray, RayHit};
+
+/// Triangles of a scene, ready to be hit.
+pub struct Geometry {
+    /// Corners, object, in the order of the scene.
+    triangles: Vec<Triangle>,
+    /// `None` for a scene without triangles.
+    hierarchy: Option<CwBvh>,
+}
+
+struct Triangle {
+    corners: [Vertex; 3],
+    object: u32,
+    material: u32,
+}
+
+/// A hit: triangle and where in it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    triangle: u32,
+    /// Along the unit direction of the ray.
+    pub distance: f64,
+    /// Weights of the second and third corner.
+    barycentric: DVec2,
+}
+
+/// The place of a hit.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// In the world.
+    pub position: DVec3,
+    /// Tangent, bitangent and normal of the base surface, orthonormal, as columns; the normal faces as the mesh does.
+    pub frame: DMat3,
+    /// Unit normal of the triangle itself.
+    pub face: DVec3,
+    /// On the map, v down the rows.
+    pub uv: DVec2,
+    /// Index into the scene's materials.
+    pub material: usize,
+    /// Index into the scene's objects.
+    pub object: usize,
+}
+
+impl Geometry {
+    /// Builds the hierarchy.
+    #[must_use]
+    pub fn new(scene: &Scene) -> Self {
+        let mut triangles = Vec::new();
+        for (object, o) in scene.objects.iter().enumerate() {
+            let of = |t: &[u32; 3]| Triangle {
+                corners: t.map(|i| o.mesh.vertices[i as usize]),
+                object: object as u32,
+                material: o.material as u32,
+            };
+            triangles.extend(o.mesh.triangles.iter().map(of));
+        }
+        let boxes: Vec<Aabb> = triangles
+            .iter()
+            .map(|t| Aabb::from_points(&t.corners.map(|c| Vec3A::from(c.position))))
+            .collect();
+        let build = || build_cwbvh(&boxes, BvhBuildParams::medium_build(), &mut Duration::default());
+        let hierarchy = (!boxes.is_empty()).then(build);
+        Self { triangles, hierarchy }
+    }
+
+    /// Number of triangles.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// True for a scene of nothing.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.triangles.is_empty()
+    }
+
+    /// The nearest triangle along a ray of unit direction, from either side.
+    #[must_use]
+    pub fn hit(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
+        let hierarchy = self.hierarchy.as_ref()?;
+        let ray = Ray::new_inf(origin.as_vec3a(), direction.as_vec3a());
+        let mut nearest: Option<Hit> = None;
+        hierarchy.ray_traverse(ray, &mut RayHit::none(), |_, i| {
+            let triangle = hierarchy.primitive_indices[i];
+            match intersect(&self.triangles[triangle as usize], origin, direction) {
+                Some((distance, barycentric)) => {
+                    if nearest.is_none_or(|n| distance < n.distance) {
+                        nearest = Some(Hit { triangle, distance, barycentric });
+                    }
+                    distance as f32
+                }
+                None => f32::INFINITY,
+            }
+        });
+        nearest
+    }
+
+    /// What lies where a ray hit.
+    #[must_use]
+    pub fn place(&self, hit: &Hit) -> Place {
+        let Triangle { corners: [a, b, c], object, material } = &self.triangles[hit.triangle as usize];
+        let DVec2 { x: s, y: t } = hit.barycentric;
+        let r = 1.0 - s - t;
+        let mix = |f: fn(&Vertex) -> DVec3| f(a) * r + f(b) * s + f(c) * t;
+        let face = face(&[*a, *b, *c]);
+        let normal = mix(|v| v.normal.as_dvec3()).normalize_or(face);
+        let tangent = mix(|v| v.tangent.truncate().as_dvec3()).reject_from_normalized(normal);
+        let tangent = tangent.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
+        let bitangent = normal.cross(tangent) * f64::from(a.tangent.w);
+        let uv = a.uv.as_dvec2() * r + b.uv.as_dvec2() * s + c.uv.as_dvec2() * t;
+        Place {
+            position: mix(|v| v.position.as_dvec3()),
+            frame: DMat3::from_cols(tangent, bitangent, normal),
+            face,
+            uv,
+            material: *material as usize,
+            object: *object as usize,
+        }
+    }
+
+    /// How the place on the map moves as the pixel moves one to the right, and one down.
+    #[must_use]
+    pub fn differentials(&self, hit: &Hit, place: &Place, rays: &Rays, at: DVec2) -> [DVec2; 2] {
+        let [a, b, c] = self.triangles[hit.triangle as usize].corners;
+        let (p, q) = ((b.position - a.position).as_dvec3(), (c.position - a.position).as_dvec3());
+        let (du, dv) = ((b.uv - a.uv).as_dvec2(), (c.uv - a.uv).as_dvec2());
+        let normal = p.cross(q);
+        let square = normal.length_squared().max(f64::MIN_POSITIVE);
+        // A step in the triangle's plane, in the triangle's own two edges.
+        rays.differentials(at, place.position, place.face).map(|step| {
+            let (s, t) = (step.cross(q).dot(normal) / square, p.cross(step).dot(normal) / square);
+            du * s + dv * t
+        })
+    }
+}
+
+/// Unit normal of a triangle; up for one without area.
+fn face([a, b, c]: &[Vertex; 3]) -> DVec3 {
+    (b.position - a.position).as_dvec3().cross((c.position - a.position).as_dvec3()).normalize_or(DVec3::Y)
+}
+
+/// Distance and the weights of the second and third corner (Möller and Trumbore 1997), in f64, where cracks between
+/// triangles are too narrow to be found by chance.
+fn intersect(triangle: &Triangle, origin: DVec3, direction: DVec3) -> Option<(f64, DVec2)> {
+    let [a, b, c] = triangle.corners.map(|c| c.position.as_dvec3());
+    let (p, q) = (b - a, c - a);
+    let across = direction.cross(q);
+    let determinant = p.dot(across);
+    if determinant == 0.0 {
+        return None;
+    }
+    let from = origin - a;
+    let s = from.dot(across) / determinant;
+    if !(0.0..=1.0).contains(&s) {
+        return None;
+    }
+    let up = from.cross(p);
+    let t = direction.dot(up) / determinant;
+    let distance = q.dot(up) / determinant;
+    (t >= 0.0 && s + t <= 1.0 && distance > 0.0).then_some((distance, DVec2::new(s, t)))
+}

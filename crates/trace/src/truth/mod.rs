@@ -1,0 +1,222 @@
+//! Brute force: what a pixel of a normal-mapped scene shows, by many rays, with the map as it is.
+//!
+//! Each ray shades one texel of the finest level, without masking or shadowing, so that a pixel tends to the plain mean of
+//! the BRDF over what it covers. Between texels the map is the bilinear mix of what the texels *reflect*, as texture units
+//! filter level 0: a ray takes the texel under a point displaced by up to half a texel either way, which has that mean.
+//! Nothing here knows of `ndfmap_core::ndf`.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use glam::{DVec2, DVec3, Vec3};
+use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::metrics::{Picture, relative_l2};
+use ndfmap_core::reflection::Finish;
+use ndfmap_core::scene::{Camera, Material, Rays, Scene};
+use ndfmap_core::surface::{SurfaceRow, Wraps};
+use ndfmap_core::units::SlopeVariance;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
+
+use crate::drift;
+use crate::geometry::{Geometry, Place};
+use crate::ways;
+
+/// Strata a pixel is cut into on each axis; every pass sends a ray through each.
+const STRATA: usize = 4;
+
+/// Rays a pixel in the least truth: one pass for each of the two halves whose difference is the noise.
+pub const LEAST_RAYS: usize = 2 * STRATA * STRATA;
+
+/// When a truth is good enough.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effort {
+    /// Rays a pixel, at most; rounded up to a multiple of [`LEAST_RAYS`].
+    pub rays: usize,
+    /// Stop once the noise is below this, too; 0 never does.
+    pub noise: f64,
+    /// Different seeds give independent truths.
+    pub seed: u64,
+}
+
+/// A picture by brute force.
+#[derive(Clone, Debug)]
+pub struct TruePicture {
+    /// Linear RGB.
+    pub picture: Picture,
+    /// Rays a pixel.
+    pub rays: usize,
+    /// Noise floor: relative L2 error that the picture has for want of rays, from the difference of its two halves.
+    pub noise: f64,
+}
+
+/// Normals of the finest level, and what they belong to.
+struct Finest<'a> {
+    material: &'a Material,
+    normals: Grid<Vec3>,
+    wraps: Wraps,
+}
+
+/// A scene, ready to be rendered by brute force.
+pub struct Truth<'a> {
+    scene: &'a Scene,
+    geometry: &'a Geometry,
+    materials: Vec<Finest<'a>>,
+}
+
+impl<'a> Truth<'a> {
+    /// Reads the maps.
+    #[must_use]
+    pub fn new(scene: &'a Scene, geometry: &'a Geometry) -> Self {
+        let finest = |material: &'a Material| {
+            let surface = &*material.surface;
+            let mut row = SurfaceRow::flat(surface.size().width);
+            let normals = Grid::from_fn(surface.size(), |x, y| {
+                if x == 0 {
+                    surface.read_row(y, &mut row);
+                }
+                row.normal(x)
+            });
+            Finest { material, normals, wraps: surface.wraps() }
+        };
+        Self { scene, geometry, materials: scene.materials.iter().map(finest).collect() }
+    }
+
+    /// Renders until the effort is spent. `progress` is told the fraction done.
+    #[must_use]
+    pub fn render(
+        &self,
+        camera: &Camera,
+        size: Size,
+        effort: &Effort,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> TruePicture {
+        let rays = camera.rays(size);
+        let passes = effort.rays.div_ceil(LEAST_RAYS).max(1);
+        let mut halves = [vec![DVec3::ZERO; size.area()], vec![DVec3::ZERO; size.area()]];
+        let mut done = 0;
+        loop {
+            // Doubling, so that looking at the noise costs little.
+            let more = if effort.noise > 0.0 { done.max(1).min(passes - done) } else { passes - done };
+            for (half, sums) in halves.iter_mut().enumerate() {
+                let whole = 2 * passes;
+                let before = 2 * done + half * more;
+                let rows = AtomicUsize::new(0);
+                sums.par_chunks_mut(size.width).enumerate().for_each(|(y, row)| {
+                    for (x, sum) in row.iter_mut().enumerate() {
+                        for pass in done..done + more {
+                            let stream = [effort.seed, (2 * pass + half) as u64, (y * size.width + x) as u64];
+                            *sum += self.pass(&rays, DVec2::new(x as f64, y as f64), stream);
+                        }
+                    }
+                    let rows = rows.fetch_add(1, Ordering::Relaxed) + 1;
+                    let part = rows as f64 / size.height as f64;
+                    progress((before as f64 + part * more as f64) / whole as f64);
+                });
+            }
+            done += more;
+            let scale = |sum: &DVec3, passes: usize| (*sum / (passes * STRATA * STRATA) as f64).as_vec3();
+            let whole: Vec<DVec3> = halves[0].iter().zip(&halves[1]).map(|(a, b)| *a + *b).collect();
+            let picture =
+                |sums: &[DVec3], passes| Grid::from_fn(size, |x, y| scale(&sums[y * size.width + x], passes));
+            let picture_of_all = picture(&whole, 2 * done);
+            // Half the difference of two halves has the spread of their mean.
+            let [a, b] = [0, 1].map(|half| picture(&halves[half], done));
+            let noise = relative_l2(&a, &b) / 2.0;
+            if done == passes || noise <= effort.noise {
+                progress(1.0);
+                return TruePicture { picture: picture_of_all, rays: done * LEAST_RAYS, noise };
+            }
+        }
+    }
+
+    /// The truth in every frame of a drift, twice, from independent rays: their mean is the truth, and half of what parts them
+    /// its noise. `rays` are those of one pixel in one frame, in both together; 512 at least.
+    #[must_use]
+    pub fn drift(
+        &self,
+        camera: &Camera,
+        size: Size,
+        rays: usize,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> [Vec<Picture>; 2] {
+        let all = drift::cells(size);
+        let cell_rays = drift::cell_camera(camera, size).rays(all);
+        let each = rays.div_ceil(2 * all.area() / ((size.width + 1) * (size.height + 1))).max(1);
+        [0, 1].map(|half| {
+            let mut cells = vec![DVec3::ZERO; all.area()];
+            let done = AtomicUsize::new(0);
+            cells.par_chunks_mut(all.width).enumerate().for_each(|(y, row)| {
+                for (x, cell) in row.iter_mut().enumerate() {
+                    let mut random = Pcg64Mcg::seed_from_u64(mix([half, y as u64, x as u64]));
+                    let sum: DVec3 = (0..each)
+                        .map(|_| self.ray(&cell_rays, DVec2::new(x as f64, y as f64), 1.0, &mut random))
+                        .sum();
+                    *cell = sum / each as f64;
+                }
+                let rows = done.fetch_add(1, Ordering::Relaxed) + 1;
+                progress((half as f64 + rows as f64 / all.height as f64) / 2.0);
+            });
+            drift::frames(&cells, size)
+        })
+    }
+
+    /// Sum over one ray through each stratum of a pixel.
+    fn pass(&self, rays: &Rays, pixel: DVec2, stream: [u64; 3]) -> DVec3 {
+        let mut random = Pcg64Mcg::seed_from_u64(mix(stream));
+        let mut sum = DVec3::ZERO;
+        for i in 0..STRATA * STRATA {
+            let stratum = DVec2::new((i % STRATA) as f64, (i / STRATA) as f64) / STRATA as f64;
+            sum += self.ray(rays, pixel + stratum, 1.0 / STRATA as f64, &mut random);
+        }
+        sum
+    }
+
+    /// What comes along a ray through a square of the picture, at a place and of a width in pixels.
+    fn ray(&self, rays: &Rays, corner: DVec2, width: f64, random: &mut Pcg64Mcg) -> DVec3 {
+        let [u, v, s, t]: [f64; 4] = random.random();
+        let direction = rays.direction(corner + DVec2::new(u, v) * width);
+        match self.geometry.hit(rays.eye, direction) {
+            Some(hit) => self.shade(&self.geometry.place(&hit), -direction, DVec2::new(s, t) - 0.5),
+            None => self.scene.background.as_dvec3(),
+        }
+    }
+
+    /// Light that the texel `displaced` (in texels) from a place sends to the eye.
+    fn shade(&self, place: &Place, eye: DVec3, displaced: DVec2) -> DVec3 {
+        let Finest { material, normals, wraps } = &self.materials[place.material];
+        let size = normals.size();
+        let at = place.uv * DVec2::new(size.width as f64, size.height as f64) + displaced;
+        let (x, y) = (
+            wraps.x.index(at.x.floor() as isize, size.width),
+            wraps.y.index(at.y.floor() as isize, size.height),
+        );
+        let n = normals.row(y)[x].as_dvec3();
+        let finish = finish_at(material, x, y);
+        let wo = place.frame.transpose() * eye;
+        ways(&self.scene.lights, (place.position, place.frame), wo)
+            .map(|(way, irradiance)| irradiance * material.reflection.facet(n, &finish, &way))
+            .sum()
+    }
+}
+
+/// What a texel of a material is made of.
+fn finish_at(material: &Material, x: usize, y: usize) -> Finish {
+    let Some(map) = &material.finish_map else { return material.finish };
+    let [r, g, b, gloss] = map.diffuse_gloss.row(y)[x].map(f64::from);
+    let specular = map.specular.as_ref().map_or(material.finish.specular, |map| {
+        let [r, g, b, _] = map.row(y)[x].map(f64::from);
+        DVec3::new(r, g, b)
+    });
+    Finish { diffuse: DVec3::new(r, g, b), specular, gloss: SlopeVariance::clamped(gloss) }
+}
+
+/// One seed of several numbers (the finaliser of SplitMix64, Steele et al. 2014, over a running sum).
+fn mix(stream: [u64; 3]) -> u64 {
+    stream.iter().fold(0, |state: u64, value| {
+        let mut z = (state ^ value).wrapping_add(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    })
+}
