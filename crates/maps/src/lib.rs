@@ -10,7 +10,9 @@ mod error;
 pub mod formats;
 mod header;
 mod image;
+pub mod model;
 mod ndf_map;
+pub mod picture;
 pub mod source;
 
 pub use error::MapError;

@@ -30,9 +30,14 @@ pub(super) struct SourceArguments {
     /// What lies beyond the edges: `repeat`, `clamp`, or one for each axis as in `repeat,clamp`
     #[arg(long, value_name = "X[,Y]", default_value = "repeat", value_parser = wraps)]
     wrap: Wraps,
+}
+
+/// How large built-in maps are made.
+#[derive(Debug, Args)]
+pub(super) struct BuiltinSize {
     /// Size of a built-in map, as in 512 or 640x480
     #[arg(long, value_name = "SIZE", default_value = "512", value_parser = size)]
-    size: Size,
+    pub(super) size: Size,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -54,7 +59,8 @@ enum FilterArgument {
 }
 
 impl SourceArguments {
-    pub(super) fn options(&self) -> SourceOptions {
+    /// The same as the library has it, for built-in maps of this size.
+    pub(super) fn options(&self, builtin_size: Size) -> SourceOptions {
         SourceOptions {
             kind: self.from.map(|from| match from {
                 From::Normal => SourceKind::Normal,
@@ -71,7 +77,7 @@ impl SourceArguments {
                 FilterArgument::Sobel => SlopeFilter::Sobel,
             },
             wraps: self.wrap,
-            builtin_size: self.size,
+            builtin_size,
         }
     }
 }
@@ -118,7 +124,7 @@ fn wraps(text: &str) -> Result<Wraps, String> {
 /// Largest side of a built-in map.
 const MAX_BUILTIN: usize = 8192;
 
-fn size(text: &str) -> Result<Size, String> {
+pub(super) fn size(text: &str) -> Result<Size, String> {
     let side = |t: &str| match t.parse::<usize>() {
         Ok(n @ 1..=MAX_BUILTIN) => Ok(n),
         _ => Err(format!("`{t}` is no side from 1 to {MAX_BUILTIN}")),

@@ -16,7 +16,7 @@ use ndfmap_maps::{Header, MAX_ATTRIBUTES, NdfMap, VERSION};
 use serde_json::json;
 
 use super::arguments::{
-    Precision, SourceArguments, brdf_spelling, method, method_spelling, methods_help, positive,
+    BuiltinSize, Precision, SourceArguments, brdf_spelling, method, method_spelling, methods_help, positive,
 };
 use super::{print, print_json, say_if_replaced, warn};
 use crate::Failure;
@@ -60,6 +60,8 @@ pub(super) struct Bake {
     layout: Layout,
     #[command(flatten)]
     source: SourceArguments,
+    #[command(flatten)]
+    builtin: BuiltinSize,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -166,7 +168,7 @@ impl Bake {
         let target = self.target()?;
         self.check(target)?;
         let start = Instant::now();
-        let map = read_source(&self.map, &self.source.options())?;
+        let map = read_source(&self.map, &self.source.options(self.builtin.size))?;
         let size = map.surface.size();
         let attributes = self.attribute.iter().map(|a| read_attribute(&a.path, a.transfer, size));
         let attributes = attributes.collect::<Result<Vec<AttributeMap>, _>>()?;

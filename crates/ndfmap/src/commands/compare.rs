@@ -9,7 +9,7 @@ use ndfmap_core::pyramid;
 use ndfmap_maps::source::{SourceMap, read_source};
 
 use super::arguments::{
-    Precision, SourceArguments, brdf_spelling, brdfs_help, method, method_spelling, methods_help,
+    BuiltinSize, Precision, SourceArguments, brdf_spelling, brdfs_help, method, method_spelling, methods_help,
 };
 use super::{print, print_json, say_if_replaced, warn};
 use crate::Failure;
@@ -43,6 +43,8 @@ pub(super) struct Compare {
     report: Option<PathBuf>,
     #[command(flatten)]
     source: SourceArguments,
+    #[command(flatten)]
+    builtin: BuiltinSize,
 }
 
 impl Compare {
@@ -55,7 +57,7 @@ impl Compare {
                 methods.push(method);
             }
         }
-        let map = read_source(&self.map, &self.source.options())?;
+        let map = read_source(&self.map, &self.source.options(self.builtin.size))?;
         for warning in &map.warnings {
             warn(&self.map, warning);
         }

@@ -10,7 +10,7 @@ use ndfmap_maps::source::{BUILTIN_PREFIX, read_source};
 use ndfmap_maps::{NdfMap, SourceKind};
 use serde_json::{Map, Value, json};
 
-use super::arguments::SourceArguments;
+use super::arguments::{BuiltinSize, SourceArguments};
 use super::{print, print_json, warn};
 use crate::Failure;
 
@@ -24,6 +24,8 @@ pub(super) struct Inspect {
     texel: Option<Vec<usize>>,
     #[command(flatten)]
     source: SourceArguments,
+    #[command(flatten)]
+    builtin: BuiltinSize,
 }
 
 impl Inspect {
@@ -70,7 +72,7 @@ impl Inspect {
     }
 
     fn describe_source(&self) -> Result<Value, Failure> {
-        let map = read_source(&self.file, &self.source.options())?;
+        let map = read_source(&self.file, &self.source.options(self.builtin.size))?;
         for warning in &map.warnings {
             warn(&self.file, warning);
         }

@@ -1,6 +1,9 @@
-//! A picture in 8-bit RGB with rectangles, cells of floats and 8×8 text, written as PNG.
+//! A picture in 8-bit RGB with 8×8 text, written as PNG.
 
 use font8x8::{BASIC_FONTS, LATIN_FONTS, UnicodeFonts};
+
+use ndfmap_core::grid::Size;
+use ndfmap_maps::picture::png_bytes;
 
 use crate::Failure;
 
@@ -48,21 +51,19 @@ impl Canvas {
 
     /// The picture as a PNG file.
     pub(super) fn to_png(&self) -> Result<Vec<u8>, Failure> {
-        let failed = |e: png::EncodingError| Failure::Failed(format!("cannot write a picture: {e}"));
-        let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        let mut writer = encoder.write_header().map_err(failed)?;
-        writer.write_image_data(self.pixels.as_flattened()).map_err(failed)?;
-        writer.finish().map_err(failed)?;
-        Ok(bytes)
+        let size = Size { width: self.width, height: self.height };
+        png_bytes(&self.pixels, size).map_err(|e| Failure::Failed(format!("cannot write a picture: {e}")))
     }
 }
 
-/// Linear light as a display value: sRGB's curve, clipped.
-pub(super) fn display(linear: f64) -> u8 {
-    let v = linear.clamp(0.0, 1.0);
-    let encoded = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-    (encoded * 255.0).round() as u8
+/// Dark to light in one hue order: readable in grey and by the colour-blind.
+pub(super) fn heat(t: f64) -> Rgb {
+    const STOPS: [Rgb; 5] = [INK, [60, 40, 120], [190, 55, 90], [250, 150, 60], PAPER];
+    let at = t * (STOPS.len() - 1) as f64;
+    let i = (at as usize).min(STOPS.len() - 2);
+    let mix = |c: usize| {
+        let (a, b) = (f64::from(STOPS[i][c]), f64::from(STOPS[i + 1][c]));
+        (a + (b - a) * (at - i as f64)).round() as u8
+    };
+    [mix(0), mix(1), mix(2)]
 }

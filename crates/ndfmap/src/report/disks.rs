@@ -7,7 +7,7 @@ use ndfmap_core::grid::Size;
 use ndfmap_core::ndf;
 use ndfmap_core::sphere::DiskLattice;
 
-use super::canvas::{Canvas, INK, LETTER, LINE, PAPER, Rgb};
+use super::canvas::{Canvas, LETTER, LINE, heat};
 use crate::measure::{Comparison, Subject};
 
 /// Points of the lattice a side, and pixels a point.
@@ -93,16 +93,4 @@ pub(super) fn plot(
             }
         }
     }
-}
-
-/// Dark to light in one hue order: readable in grey and by the colour-blind.
-fn heat(t: f64) -> Rgb {
-    const STOPS: [Rgb; 5] = [INK, [60, 40, 120], [190, 55, 90], [250, 150, 60], PAPER];
-    let at = t * (STOPS.len() - 1) as f64;
-    let i = (at as usize).min(STOPS.len() - 2);
-    let mix = |c: usize| {
-        let (a, b) = (f64::from(STOPS[i][c]), f64::from(STOPS[i + 1][c]));
-        (a + (b - a) * (at - i as f64)).round() as u8
-    };
-    [mix(0), mix(1), mix(2)]
 }

@@ -3,11 +3,12 @@
 use glam::DVec3;
 use ndfmap_core::error::Truth;
 use ndfmap_core::grid::Size;
+use ndfmap_core::metrics::display_value;
 use ndfmap_core::ndf;
 use ndfmap_core::sphere::DiskLattice;
 use rayon::prelude::*;
 
-use super::canvas::{Canvas, LETTER, LINE, display};
+use super::canvas::{Canvas, LETTER, LINE};
 use crate::measure::{Comparison, Subject, three_digits};
 
 /// Pixels of a cell's longer side.
@@ -54,7 +55,7 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Canvas {
             for j in 0..height {
                 for i in 0..width {
                     let texel = (j * size.height / height) * size.width + i * size.width / width;
-                    let v = display(column.levels[row][texel] / white);
+                    let v = (display_value((column.levels[row][texel] / white) as f32) * 255.0).round() as u8;
                     canvas.set(x + i, y + j, [v; 3]);
                 }
             }

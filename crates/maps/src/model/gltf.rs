@@ -1,0 +1,355 @@
+//! glTF 2.0 by the `gltf` crate: meshes in the pose of the file, and metallic-roughness materials.
+//!
+//! Read: positions, normals, tangents, the normal texture's coordinates (with `KHR_texture_transform` and scale), base
+//! colour, metalness and roughness, factors and textures. Colours and roughness are sampled at the texels of the
+//! normal map. Not read: animation, skins, morphs, occlusion, emission, alpha, cameras and lights.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use glam::{DVec3, Mat3, Mat4, Vec2, Vec3, Vec4};
+use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::reflection::Finish;
+use ndfmap_core::scene::{FinishMap, Material};
+use ndfmap_core::surface::{Surface, SurfaceRow, Wrap, Wraps, unit_or_up};
+use ndfmap_core::units::{Alpha, PerceptualRoughness, SlopeVariance};
+
+use super::{ModelFormat, Parts, RawMesh, flat, microfacets};
+use crate::attribute::{Transfer, attribute_of_image};
+use crate::formats::{read_file, read_image};
+use crate::source::{SourceOptions, source_of_image};
+use crate::{Image, MapError, SourceKind};
+
+pub(super) const FORMAT: ModelFormat = ModelFormat { name: "glTF", extensions: &["gltf", "glb"], read };
+
+/// Smoothest surface that is told from a mirror: a highlight of a point light has to be found by chance.
+const LEAST_ROUGHNESS: f64 = 0.05;
+
+/// Deepest tree of nodes.
+const MAX_DEPTH: usize = 64;
+
+fn read(path: &Path, bytes: &[u8], warnings: &mut Vec<String>) -> Result<Parts, MapError> {
+    let document = gltf::Gltf::from_slice(bytes).map_err(|e| MapError::invalid(path, e))?;
+    let buffers = document
+        .buffers()
+        .map(|buffer| match buffer.source() {
+            gltf::buffer::Source::Bin => {
+                document.blob.clone().ok_or_else(|| MapError::invalid(path, "lacks its binary chunk"))
+            }
+            gltf::buffer::Source::Uri(uri) => resource(path, uri).map(|(_, bytes)| bytes),
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    let files = Files { path, buffers };
+    let mut materials = Vec::new();
+    for material in document.materials() {
+        materials.push(files.material(&material, warnings)?);
+    }
+    // What has no material gets glTF's default one, at the end.
+    materials.push(super::plain());
+    let mut walk = Walk { files: &files, plain: materials.len() - 1, meshes: Vec::new() };
+    let scene = document.default_scene().or_else(|| document.scenes().next());
+    for node in scene.iter().flat_map(gltf::Scene::nodes) {
+        walk.node(&node, Mat4::IDENTITY, 0)?;
+    }
+    if document.animations().len() + document.skins().len() > 0 {
+        warnings.push("is animated: only the pose of the file is shown".to_owned());
+    }
+    Ok(Parts { meshes: walk.meshes, materials })
+}
+
+/// The document's files.
+struct Files<'a> {
+    path: &'a Path,
+    buffers: Vec<Vec<u8>>,
+}
+
+/// The bytes behind a URI, and a path to name them by.
+fn resource(path: &Path, uri: &str) -> Result<(PathBuf, Vec<u8>), MapError> {
+    if let Some(data) = uri.strip_prefix("data:") {
+        let coded = data.split_once(";base64,").map(|(_, coded)| coded);
+        let coded = coded.ok_or_else(|| MapError::unsupported(path, "has a data URI that is not base64"))?;
+        let bytes = STANDARD
+            .decode(coded)
+            .map_err(|e| MapError::invalid(path, format!("has a damaged data URI: {e}")))?;
+        return Ok((path.to_owned(), bytes));
+    }
+    if uri.contains("://") {
+        return Err(MapError::unsupported(path, format!("names `{uri}`, which is not a file beside it")));
+    }
+    let file = path.with_file_name("").join(percent_decoded(uri));
+    let bytes = read_file(&file)?;
+    Ok((file, bytes))
+}
+
+/// A URI's `%20` and its kind as the characters they stand for.
+fn percent_decoded(uri: &str) -> String {
+    let mut bytes = Vec::new();
+    let mut rest = uri.as_bytes();
+    while let Some((first, tail)) = rest.split_first() {
+        let code = tail.get(..2).and_then(|hex| std::str::from_utf8(hex).ok());
+        match code.and_then(|hex| u8::from_str_radix(hex, 16).ok()) {
+            Some(byte) if *first == b'%' => {
+                bytes.push(byte);
+                rest = &tail[2..];
+            }
+            _ => {
+                bytes.push(*first);
+                rest = tail;
+            }
+        }
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// A normal map with its x and y scaled, as `normalTexture.scale` asks.
+struct Scaled {
+    inner: Box<dyn Surface>,
+    scale: f32,
+}
+
+impl Surface for Scaled {
+    fn size(&self) -> Size {
+        self.inner.size()
+    }
+
+    fn wraps(&self) -> Wraps {
+        self.inner.wraps()
+    }
+
+    fn read_row(&self, y: usize, row: &mut SurfaceRow) {
+        self.inner.read_row(y, row);
+        for i in 0..row.width() {
+            let n = row.normal(i);
+            row.set_normal(i, unit_or_up(Vec3::new(n.x * self.scale, n.y * self.scale, n.z)));
+        }
+    }
+}
+
+impl Files<'_> {
+    /// The picture of a texture, and a path to name it by.
+    fn image(&self, texture: &gltf::Texture<'_>) -> Result<(PathBuf, Image), MapError> {
+        let (file, bytes) = match texture.source().source() {
+            gltf::image::Source::Uri { uri, .. } => resource(self.path, uri)?,
+            gltf::image::Source::View { view, .. } => {
+                let buffer = &self.buffers[view.buffer().index()];
+                let bytes =
+                    view.offset().checked_add(view.length()).and_then(|end| buffer.get(view.offset()..end));
+                let bytes =
+                    bytes.ok_or_else(|| MapError::invalid(self.path, "has a picture outside its buffer"))?;
+                (self.path.to_owned(), bytes.to_vec())
+            }
+        };
+        // A picture inside the file has no name, and is told by its first bytes.
+        let image = read_image(&file, &bytes)?;
+        Ok((file, image))
+    }
+
+    /// A texture's values, decoded.
+    fn values(&self, texture: &gltf::Texture<'_>, transfer: Transfer) -> Result<Grid<[f32; 4]>, MapError> {
+        let (file, image) = self.image(texture)?;
+        Ok(attribute_of_image(&file, &image, transfer)?.values)
+    }
+
+    fn material(
+        &self,
+        material: &gltf::Material<'_>,
+        warnings: &mut Vec<String>,
+    ) -> Result<Material, MapError> {
+        let name = material.name().unwrap_or("unnamed").to_owned();
+        let pbr = material.pbr_metallic_roughness();
+        let base = pbr.base_color_texture().map(|t| self.values(&t.texture(), Transfer::Srgb)).transpose()?;
+        let metal_rough = pbr
+            .metallic_roughness_texture()
+            .map(|t| self.values(&t.texture(), Transfer::Linear))
+            .transpose()?;
+        let normal = material.normal_texture();
+        let surface: Arc<dyn Surface> = match &normal {
+            Some(normal) => {
+                let (file, image) = self.image(&normal.texture())?;
+                let wraps = wraps(&normal.texture().sampler());
+                let options =
+                    SourceOptions { kind: Some(SourceKind::Normal), wraps, ..SourceOptions::default() };
+                let map = source_of_image(&file, image, String::new(), &options)?;
+                warnings.extend(map.warnings.iter().map(|w| format!("normal map of `{name}` {w}")));
+                if normal.scale() == 1.0 {
+                    Arc::from(map.surface)
+                } else {
+                    Arc::new(Scaled { inner: map.surface, scale: normal.scale() })
+                }
+            }
+            None => {
+                flat(base.as_ref().or(metal_rough.as_ref()).map_or(Size { width: 1, height: 1 }, Grid::size))
+            }
+        };
+        let same_coordinates = |set: u32| normal.as_ref().is_none_or(|n| n.tex_coord() == set);
+        let sets = pbr
+            .base_color_texture()
+            .map(|t| t.tex_coord())
+            .into_iter()
+            .chain(pbr.metallic_roughness_texture().map(|t| t.tex_coord()));
+        if !sets.into_iter().all(same_coordinates) {
+            warnings.push(format!(
+                "textures of `{name}` have other coordinates than its normal map, and are laid on by its own"
+            ));
+        }
+        let factors = Factors {
+            base: pbr.base_color_factor(),
+            metallic: pbr.metallic_factor(),
+            roughness: pbr.roughness_factor(),
+        };
+        let (finish, roughness) = factors.finish([1.0; 4], [1.0; 4]);
+        if base.is_none() && metal_rough.is_none() {
+            let finish = Finish { gloss: SlopeVariance::ZERO, ..finish };
+            return Ok(Material {
+                name,
+                surface,
+                finish,
+                finish_map: None,
+                reflection: microfacets(roughness * roughness),
+            });
+        }
+        let size = surface.size();
+        let sample = |map: &Option<Grid<[f32; 4]>>, x: usize, y: usize| {
+            map.as_ref().map_or([1.0; 4], |map| {
+                let from = map.size();
+                map.row((2 * y + 1) * from.height / (2 * size.height))
+                    [(2 * x + 1) * from.width / (2 * size.width)]
+            })
+        };
+        let at = |x: usize, y: usize| factors.finish(sample(&base, x, y), sample(&metal_rough, x, y)).0;
+        let rgb = |c: DVec3, w: f64| [c.x as f32, c.y as f32, c.z as f32, w as f32];
+        let diffuse_gloss = Grid::from_fn(size, |x, y| {
+            let finish = at(x, y);
+            rgb(finish.diffuse, finish.gloss.get())
+        });
+        let specular = Grid::from_fn(size, |x, y| rgb(at(x, y).specular, 1.0));
+        let finish_map =
+            Some(FinishMap { diffuse_gloss: diffuse_gloss.into(), specular: Some(specular.into()) });
+        // The lobe itself is as sharp as can be; all its width is in the map.
+        Ok(Material { name, surface, finish, finish_map, reflection: microfacets(0.0) })
+    }
+}
+
+/// A material's constant factors.
+struct Factors {
+    base: [f32; 4],
+    metallic: f32,
+    roughness: f32,
+}
+
+impl Factors {
+    /// The finish under texture values, and its roughness (glTF 2.0, appendix B).
+    fn finish(&self, base: [f32; 4], metal_rough: [f32; 4]) -> (Finish, f64) {
+        let base = DVec3::from([0, 1, 2].map(|i| f64::from(self.base[i] * base[i])));
+        let metal = f64::from(self.metallic * metal_rough[2]).clamp(0.0, 1.0);
+        let roughness = f64::from(self.roughness * metal_rough[1]).clamp(LEAST_ROUGHNESS, 1.0);
+        let alpha = PerceptualRoughness::new(roughness).map(Alpha::from);
+        let gloss = alpha.map_or(SlopeVariance::ZERO, SlopeVariance::from);
+        let finish =
+            Finish { diffuse: base * (1.0 - metal), specular: DVec3::splat(0.04).lerp(base, metal), gloss };
+        (finish, roughness)
+    }
+}
+
+fn wraps(sampler: &gltf::texture::Sampler<'_>) -> Wraps {
+    // What is mirrored is taken as repeated: nobody's normal maps are meant to be mirrored.
+    let wrap =
+        |mode| if mode == gltf::texture::WrappingMode::ClampToEdge { Wrap::Clamp } else { Wrap::Repeat };
+    Wraps { x: wrap(sampler.wrap_s()), y: wrap(sampler.wrap_t()) }
+}
+
+/// Goes through nodes and collects their meshes.
+struct Walk<'a> {
+    files: &'a Files<'a>,
+    plain: usize,
+    meshes: Vec<(RawMesh, usize)>,
+}
+
+impl Walk<'_> {
+    fn node(&mut self, node: &gltf::Node<'_>, above: Mat4, depth: usize) -> Result<(), MapError> {
+        if depth > MAX_DEPTH {
+            return Err(MapError::invalid(self.files.path, format!("has nodes more than {MAX_DEPTH} deep")));
+        }
+        let pose = above * Mat4::from_cols_array_2d(&node.transform().matrix());
+        for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
+            if primitive.mode() == gltf::mesh::Mode::Triangles {
+                let mesh = self.primitive(&primitive, pose)?;
+                self.meshes.push((mesh, primitive.material().index().unwrap_or(self.plain)));
+            }
+        }
+        for child in node.children() {
+            self.node(&child, pose, depth + 1)?;
+        }
+        Ok(())
+    }
+
+    fn primitive(&self, primitive: &gltf::Primitive<'_>, pose: Mat4) -> Result<RawMesh, MapError> {
+        let path = self.files.path;
+        let held: usize = self.files.buffers.iter().map(Vec::len).sum();
+        let counts =
+            primitive.attributes().map(|(_, a)| a.count()).chain(primitive.indices().map(|a| a.count()));
+        if counts.into_iter().any(|count| count > held) {
+            return Err(MapError::invalid(path, "announces more vertices than its buffers can hold"));
+        }
+        let reader = primitive.reader(|buffer| self.files.buffers.get(buffer.index()).map(Vec::as_slice));
+        let turn = Mat3::from_mat4(pose);
+        let lasting = turn.inverse().transpose();
+        let mirrored = turn.determinant() < 0.0;
+        let positions: Vec<Vec3> = reader
+            .read_positions()
+            .ok_or_else(|| MapError::invalid(path, "has a mesh without positions, or outside its buffer"))?
+            .map(|p| pose.transform_point3(p.into()))
+            .collect();
+        let mut indices: Vec<u32> = match reader.read_indices() {
+            Some(indices) => indices.into_u32().collect(),
+            None => (0..positions.len() as u32).collect(),
+        };
+        if mirrored {
+            indices.as_chunks_mut::<3>().0.iter_mut().for_each(|t| t.swap(1, 2));
+        }
+        let normal_texture = primitive.material().normal_texture();
+        let set = normal_texture.as_ref().map_or(0, gltf::material::NormalTexture::tex_coord);
+        let place = |uv: [f32; 2]| match normal_texture.as_ref().and_then(normal_transform) {
+            Some((offset, rotation, scale)) => {
+                // KHR_texture_transform: scale, then rotate counter-clockwise as seen with v down, then move.
+                let (sin, cos) = rotation.sin_cos();
+                let uv = Vec2::from(uv) * scale;
+                Vec2::new(cos * uv.x + sin * uv.y, cos * uv.y - sin * uv.x) + offset
+            }
+            None => uv.into(),
+        };
+        let sign = if mirrored { -1.0 } else { 1.0 };
+        Ok(RawMesh {
+            positions,
+            normals: reader
+                .read_normals()
+                .map(|n| n.map(|n| lasting * Vec3::from(n)).collect())
+                .unwrap_or_default(),
+            uvs: reader.read_tex_coords(set).map(|uv| uv.into_f32().map(place).collect()).unwrap_or_default(),
+            tangents: reader
+                .read_tangents()
+                .map(|t| {
+                    let turned = |t: [f32; 4]| {
+                        let t = Vec4::from(t);
+                        (turn * t.truncate()).extend(sign * t.w)
+                    };
+                    t.map(turned).collect()
+                })
+                .unwrap_or_default(),
+            triangles: indices.as_chunks().0.to_vec(),
+        })
+    }
+}
+
+/// Offset, rotation and scale of `KHR_texture_transform` on a normal texture, which the crate keeps as plain JSON.
+fn normal_transform(normal: &gltf::material::NormalTexture<'_>) -> Option<(Vec2, f32, Vec2)> {
+    let value = normal.extension_value("KHR_texture_transform")?;
+    let pair = |key: &str, or: f32| {
+        let part = |i: usize| value.get(key).and_then(|v| v.get(i)).and_then(serde_json::Value::as_f64);
+        Vec2::new(part(0).map_or(or, |v| v as f32), part(1).map_or(or, |v| v as f32))
+    };
+    let rotation = value.get("rotation").and_then(serde_json::Value::as_f64).unwrap_or(0.0) as f32;
+    Some((pair("offset", 0.0), rotation, pair("scale", 1.0)))
+}
