@@ -31,7 +31,16 @@ fn arrows_point_one_way() {
     let set = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect::<BTreeSet<_>>();
     assert_eq!(own_dependencies("ndfmap-core"), set(&[]));
     assert_eq!(own_dependencies("ndfmap-maps"), set(&["ndfmap-core"]));
-    assert_eq!(own_dependencies("ndfmap"), set(&["ndfmap-core", "ndfmap-maps"]));
+    assert_eq!(own_dependencies("ndfmap-trace"), set(&["ndfmap-core"]));
+    assert_eq!(own_dependencies("ndfmap"), set(&["ndfmap-core", "ndfmap-maps", "ndfmap-trace"]));
+}
+
+#[test]
+fn truth_shares_no_representation() {
+    for file in tracked().iter().filter(|f| f.starts_with("crates/trace/src/truth")) {
+        let used = read(file).lines().any(|l| !l.starts_with("//!") && (l.contains("::ndf") || l.contains("filtered")));
+        assert!(!used, "{} uses what it is to judge", file.display());
+    }
 }
 
 #[test]
@@ -197,5 +206,15 @@ fn tables_in_the_documents_are_those_of_the_code() {
     }
     for row in ndfmap_core::procedural::TABLE {
         assert!(methods.contains(&format!("`builtin:{}`", row.name)), "docs/methods.md lacks {}", row.name);
+    }
+    let scenes = read(Path::new("docs/scenes.md"));
+    for row in ndfmap_core::scene::TABLE {
+        assert!(scenes.contains(&format!("`{}`", row.name)), "docs/scenes.md lacks {}", row.name);
+    }
+    for model in ndfmap_core::reflection::Model::ALL {
+        assert!(scenes.contains(&format!("`{}`", model.name())), "docs/scenes.md lacks {}", model.name());
+    }
+    for row in ndfmap_maps::model::TABLE {
+        assert!(formats.contains(row.name), "docs/formats.md lacks {}", row.name);
     }
 }

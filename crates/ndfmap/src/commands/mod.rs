@@ -9,6 +9,7 @@ mod bake;
 mod compare;
 mod demo;
 mod inspect;
+mod render;
 
 use std::path::Path;
 
@@ -44,6 +45,7 @@ enum Command {
     Bake(bake::Bake),
     Inspect(inspect::Inspect),
     Compare(compare::Compare),
+    Render(render::Render),
 }
 
 impl Program {
@@ -63,6 +65,7 @@ impl Program {
             Command::Bake(command) => command.run(json),
             Command::Inspect(command) => command.run(json),
             Command::Compare(command) => command.run(json),
+            Command::Render(command) => command.run(json),
         }
     }
 }

@@ -3,6 +3,7 @@
 mod between;
 mod canvas;
 mod disks;
+pub(crate) mod pictures;
 mod plot;
 mod sheet;
 

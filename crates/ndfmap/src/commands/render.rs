@@ -1,0 +1,358 @@
+//! `ndfmap render`: pictures of a scene, through baked maps and by brute force, and how far they are apart.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use glam::DVec3;
+use ndfmap_core::grid::Size;
+use ndfmap_core::light::Light;
+use ndfmap_core::lookup::Filtering;
+use ndfmap_core::ndf::Method;
+use ndfmap_core::reflection::Model;
+use ndfmap_core::scene;
+use ndfmap_maps::picture::{PictureFormat, write_picture};
+use ndfmap_maps::source::read_source;
+use ndfmap_trace::filtered::Lookups;
+use ndfmap_trace::truth::Effort;
+use serde_json::json;
+
+use super::arguments::{
+    Precision, SourceArguments, brdf_spelling, brdfs_help, method, method_spelling, methods_help, positive,
+    size,
+};
+use super::{print, print_json, say_if_replaced, warn};
+use crate::Failure;
+use crate::imaging::{Frame, Reel, Shot, shoot};
+use crate::report::pictures;
+use crate::staging::{CameraArgument, Stage};
+
+/// Render a scene through baked maps, and by brute force to compare
+#[derive(Debug, Args)]
+#[command(after_long_help = format!("{}\n\n{}\n\n{}", scenes_help(), methods_help(), brdfs_help()))]
+pub(super) struct Render {
+    /// A built-in scene, or a model: .gltf, .glb, .obj or .ply
+    #[arg(long, value_name = "NAME|FILE")]
+    scene: String,
+    /// A normal or height map, or `builtin:NAME`, for the scene's first material
+    #[arg(long)]
+    map: Option<PathBuf>,
+    /// The picture to write, by the first method: .png as shown, .exr in linear light; several frames are numbered
+    #[arg(short, long, value_name = "FILE", required_unless_present_any = ["compare", "truth_output", "json"])]
+    output: Option<PathBuf>,
+    /// Methods, separated by commas
+    #[arg(short, long, value_delimiter = ',', default_value = "vmf:4", value_parser = method_spelling)]
+    method: Vec<String>,
+    /// Render the truth too, with at most this many rays a pixel, and measure against it
+    #[arg(long, value_name = "RAYS", num_args = 0..=1, default_missing_value = "256",
+        value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    truth: Option<u32>,
+    /// Stop the truth once its noise (relative L2) is below this
+    #[arg(long, value_name = "X", value_parser = positive, requires = "truth")]
+    truth_noise: Option<f64>,
+    /// Write the truth's picture
+    #[arg(long, value_name = "FILE", requires = "truth")]
+    truth_output: Option<PathBuf>,
+    /// Write a contact sheet: truth, each method, differences and errors
+    #[arg(long, value_name = "SHEET.png")]
+    compare: Option<PathBuf>,
+    /// Also measure how each method sparkles as the camera drifts by a pixel; 17 more pictures each
+    #[arg(long, requires = "truth")]
+    sparkle: bool,
+    /// Size of the picture, as in 500 or 640x480
+    #[arg(long, value_name = "SIZE", default_value = "500", value_parser = size)]
+    size: Size,
+    /// When: 0 to 1, or several times separated by commas
+    #[arg(long, value_delimiter = ',', default_value = "0", value_parser = time)]
+    time: Vec<f64>,
+    /// This many frames from time 0 to 1, in place of `--time`
+    #[arg(long, value_name = "N", conflicts_with = "time", value_parser = clap::value_parser!(u16).range(1..=10_000))]
+    frames: Option<u16>,
+    /// Where the camera is and looks: EX,EY,EZ,TX,TY,TZ and perhaps its angle of view in degrees
+    #[arg(long, value_name = "NUMBERS", value_parser = camera, allow_hyphen_values = true)]
+    camera: Option<CameraArgument>,
+    /// A light in place of the scene's: the direction to it X,Y,Z, or `point:X,Y,Z`, and perhaps :R,G,B. May be repeated
+    #[arg(long, value_name = "LIGHT", value_parser = light, allow_hyphen_values = true)]
+    light: Vec<Light>,
+    /// A reflectance lobe in place of the materials' own
+    #[arg(long, value_parser = brdf_spelling)]
+    brdf: Option<String>,
+    /// What goes with the lobe: Tan et al.'s, Han et al.'s or Smith's factor
+    #[arg(long, value_enum)]
+    model: Option<ModelArgument>,
+    #[command(flatten)]
+    filter: FilterArguments,
+    /// Display values are sRGB of light times this
+    #[arg(long, value_parser = positive)]
+    exposure: Option<f64>,
+    /// What renders
+    #[arg(long, value_enum, default_value_t = Device::Auto)]
+    device: Device,
+    /// Bits of a stored channel
+    #[arg(long, value_enum, default_value_t = Precision::Half)]
+    precision: Precision,
+    /// Size of built-in maps
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    map_size: Option<Size>,
+    #[command(flatten)]
+    source: SourceArguments,
+}
+
+/// How maps are looked up.
+#[derive(Debug, Args)]
+pub(super) struct FilterArguments {
+    /// `trilinear`; `anisotropic:N`, with up to N taps along the longer axis, as texture units do; or `fine:N`, the same
+    /// in four times the taps at a level one finer, nearer to the pixel's square
+    #[arg(long, value_name = "FILTER", default_value = "fine:16", value_parser = filter)]
+    filter: Filtering,
+    /// Levels to add to what the filter asks for; negative is sharper
+    #[arg(long, value_name = "LEVELS", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
+    lod_bias: f64,
+    /// Shade every texel that the filter reads and mix the results, for lobes that are not aligned
+    #[arg(long)]
+    neighbours: bool,
+    /// Take cosines at the lobes' means, as the papers print them
+    #[arg(long)]
+    at_means: bool,
+}
+
+impl FilterArguments {
+    pub(super) fn lookups(&self) -> Lookups {
+        Lookups {
+            filtering: Filtering { lod_bias: self.lod_bias, ..self.filter },
+            neighbours: self.neighbours,
+            at_means: self.at_means,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum ModelArgument {
+    Tan,
+    Han,
+    Smith,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Device {
+    /// The best there is: so far the processor
+    Auto,
+    /// The processor
+    Cpu,
+}
+
+fn scenes_help() -> String {
+    let rows =
+        scene::TABLE.iter().map(|r| format!("  {:13} {}; over time, {}", r.name, r.summary, r.animation));
+    format!("Scenes:\n{}", rows.collect::<Vec<_>>().join("\n"))
+}
+
+fn time(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(t) if (0.0..=1.0).contains(&t) => Ok(t),
+        _ => Err("must be a number from 0 to 1".to_owned()),
+    }
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(v) if v.abs() <= 1e9 => Ok(v),
+        _ => Err(format!("`{text}` is no number between -1e9 and 1e9")),
+    }
+}
+
+fn numbers(text: &str) -> Result<Vec<f64>, String> {
+    text.split(',').map(finite).collect()
+}
+
+fn three(text: &str) -> Result<DVec3, String> {
+    match numbers(text)?[..] {
+        [x, y, z] => Ok(DVec3::new(x, y, z)),
+        _ => Err(format!("`{text}` is not three numbers")),
+    }
+}
+
+fn camera(text: &str) -> Result<CameraArgument, String> {
+    let all = numbers(text)?;
+    let (eye, target, degrees) = match all[..] {
+        [a, b, c, d, e, f] => (DVec3::new(a, b, c), DVec3::new(d, e, f), None),
+        [a, b, c, d, e, f, degrees] if degrees > 0.1 && degrees < 179.0 => {
+            (DVec3::new(a, b, c), DVec3::new(d, e, f), Some(degrees))
+        }
+        _ => {
+            return Err(
+                "needs six numbers, the eye and what it looks at, or a seventh: degrees from 0.1 to 179"
+                    .to_owned(),
+            );
+        }
+    };
+    if eye.distance(target) < 1e-9 {
+        return Err("the eye must be somewhere else than what it looks at".to_owned());
+    }
+    Ok(CameraArgument { eye, target, degrees })
+}
+
+fn light(text: &str) -> Result<Light, String> {
+    let (point, rest) = text.strip_prefix("point:").map_or((false, text), |rest| (true, rest));
+    let (place, colour) = rest.split_once(':').unwrap_or((rest, "3,3,3"));
+    let (place, colour) = (three(place)?, three(colour)?);
+    if colour.min_element() < 0.0 {
+        return Err("a colour must not be below 0".to_owned());
+    }
+    if point {
+        return Ok(Light::Point { at: place, intensity: colour });
+    }
+    let towards = place.try_normalize().ok_or("a direction must not be zero")?;
+    Ok(Light::Directional { towards, irradiance: colour })
+}
+
+pub(super) fn filter(text: &str) -> Result<Filtering, String> {
+    let known = match text.split_once(':') {
+        None if text == "trilinear" => Some(Filtering::TRILINEAR),
+        Some((name, taps)) => match (name, taps.parse().ok().filter(|n| (1..=64).contains(n))) {
+            ("anisotropic", Some(taps)) => Some(Filtering::anisotropic(taps)),
+            ("fine", Some(taps)) => Some(Filtering::fine(taps)),
+            _ => None,
+        },
+        None => None,
+    };
+    known.ok_or_else(|| "must be `trilinear`, or `anisotropic:N` or `fine:N` with N from 1 to 64".to_owned())
+}
+
+/// Checks that a picture can be written under this name.
+fn checked(path: &Path) -> Result<(), Failure> {
+    match PictureFormat::of(path) {
+        Some(_) => Ok(()),
+        None => Err(Failure::Usage(format!("{}: pictures are written as .png or .exr", path.display()))),
+    }
+}
+
+impl Render {
+    pub(super) fn run(self, json: bool) -> Result<(), Failure> {
+        let start = Instant::now();
+        self.output.iter().chain(&self.truth_output).try_for_each(|path| checked(path))?;
+        if let Some(sheet) = &self.compare
+            && PictureFormat::of(sheet) != Some(PictureFormat::Png)
+        {
+            return Err(Failure::Usage(format!("{}: contact sheets are written as .png", sheet.display())));
+        }
+        let mut methods: Vec<Box<dyn Method>> = Vec::new();
+        for spelling in &self.method {
+            let method = method(spelling)?;
+            if methods.iter().all(|m| m.spelling() != method.spelling()) {
+                methods.push(method);
+            }
+        }
+        let stage = self.stage()?;
+        let times = match self.frames {
+            Some(1) => vec![0.0],
+            Some(frames) => (0..frames).map(|i| f64::from(i) / f64::from(frames - 1)).collect(),
+            None => self.time.clone(),
+        };
+        let shot = Shot {
+            stage: &stage,
+            times: &times,
+            methods: &methods,
+            size: self.size,
+            precision: self.precision.into(),
+            lookups: self.filter.lookups(),
+            truth: self.truth.map(|rays| Effort {
+                rays: rays as usize,
+                noise: self.truth_noise.unwrap_or(0.0),
+                seed: 0,
+            }),
+            sparkle: self.sparkle,
+        };
+        let mut written = Vec::new();
+        let reel = shoot(&shot, &mut |at, frame| self.write(at, times.len(), frame, &mut written))?;
+        if let Some(sheet) = &self.compare {
+            let title = format!("{}  {} x {}", self.scene, self.size.width, self.size.height);
+            say_if_replaced(sheet);
+            ndfmap_maps::atomic::write(sheet, &pictures::draw(&reel, &title)?)?;
+            written.push(sheet.clone());
+        }
+        for file in &written {
+            eprintln!("ndfmap: wrote {}", file.display());
+        }
+        if json {
+            print_json(&self.to_json(&reel, start.elapsed().as_secs_f64()))
+        } else {
+            print(&reel.to_table())
+        }
+    }
+
+    fn stage(&self) -> Result<Stage, Failure> {
+        let map = match &self.map {
+            Some(path) => {
+                let size = self.map_size.unwrap_or(Size { width: 512, height: 512 });
+                let map = read_source(path, &self.source.options(size))?;
+                map.warnings.iter().for_each(|w| warn(path, w));
+                Some(map.surface.into())
+            }
+            None => None,
+        };
+        Ok(Stage {
+            scene: self.scene.clone(),
+            map,
+            map_size: self.map_size,
+            brdf: self.brdf.clone(),
+            model: self.model.map(|model| match model {
+                ModelArgument::Tan => Model::Tan,
+                ModelArgument::Han => Model::Han,
+                ModelArgument::Smith => Model::Smith,
+            }),
+            camera: self.camera,
+            lights: self.light.clone(),
+            exposure: self.exposure,
+        })
+    }
+
+    /// Writes the pictures of a frame.
+    fn write(
+        &self,
+        at: usize,
+        frames: usize,
+        frame: &Frame,
+        written: &mut Vec<PathBuf>,
+    ) -> Result<(), Failure> {
+        let picture = frame.takes.first().map(|t| &t.picture);
+        let truth = frame.truth.as_ref().map(|t| &t.picture);
+        for (path, picture) in [(&self.output, picture), (&self.truth_output, truth)] {
+            let (Some(path), Some(picture)) = (path, picture) else { continue };
+            let path = if frames > 1 { numbered(path, at) } else { path.clone() };
+            say_if_replaced(&path);
+            write_picture(&path, picture, frame.exposure)?;
+            written.push(path);
+        }
+        Ok(())
+    }
+
+    fn to_json(&self, reel: &Reel, seconds: f64) -> serde_json::Value {
+        let methods = reel.to_json();
+        let first = &methods[&reel.methods[0]];
+        let mut value = json!({
+            "scene": self.scene,
+            "method": reel.methods[0],
+            "device": "cpu",
+            "width": self.size.width,
+            "height": self.size.height,
+            "seconds": seconds,
+            "frame_ms": first["frame_ms"],
+        });
+        if let Some(error) = first.get("error") {
+            value["error"] = error.clone();
+        }
+        if let Some(truth) = reel.truth_json() {
+            value["truth"] = truth;
+        }
+        value["methods"] = methods.into();
+        value
+    }
+}
+
+/// `name.png` as `name-0007.png`.
+fn numbered(path: &Path, at: usize) -> PathBuf {
+    let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    let extension = path.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
+    path.with_file_name(format!("{stem}-{at:04}.{extension}"))
+}

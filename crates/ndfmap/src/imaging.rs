@@ -1,0 +1,282 @@
+//! Pictures of a scene by every method, and how far each is from the truth as a viewer sees it.
+
+use std::time::Instant;
+
+use ndfmap_core::grid::Size;
+use ndfmap_core::metrics::{Picture, change, color_error, relative_l2};
+use ndfmap_core::ndf::Method;
+use ndfmap_core::pyramid::Precision;
+use ndfmap_core::scene::Scene;
+use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
+use ndfmap_trace::truth::{Effort, TruePicture, Truth};
+use ndfmap_trace::{DRIFT_FRAMES, Geometry, drifted};
+use serde_json::{Map, Value, json};
+
+use crate::Failure;
+use crate::progress::Progress;
+use crate::staging::Stage;
+
+/// What is to be rendered.
+pub(crate) struct Shot<'a> {
+    pub(crate) stage: &'a Stage,
+    /// Times of the frames, at least one.
+    pub(crate) times: &'a [f64],
+    pub(crate) methods: &'a [Box<dyn Method>],
+    pub(crate) size: Size,
+    pub(crate) precision: Precision,
+    pub(crate) lookups: Lookups,
+    /// Render the truth too.
+    pub(crate) truth: Option<Effort>,
+    /// Measure sparkle, in every frame.
+    pub(crate) sparkle: bool,
+}
+
+/// A frame: the truth, where asked for, and a picture by each method.
+pub(crate) struct Frame {
+    pub(crate) time: f64,
+    pub(crate) exposure: f32,
+    pub(crate) truth: Option<TruePicture>,
+    pub(crate) truth_seconds: f64,
+    /// How the truth changes as the camera drifts, where sparkle is measured.
+    pub(crate) drifting: Option<Drifting>,
+    pub(crate) takes: Vec<Take>,
+}
+
+/// One method's picture.
+pub(crate) struct Take {
+    pub(crate) picture: Picture,
+    pub(crate) milliseconds: f64,
+    /// Against the truth, where there is one.
+    pub(crate) errors: Option<Errors>,
+}
+
+/// How far a picture is from the truth.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Errors {
+    pub(crate) relative_l2: f64,
+    pub(crate) color_error: f64,
+    /// `None` where the program is built without FLIP.
+    pub(crate) flip: Option<f64>,
+    pub(crate) sparkle: Option<f64>,
+}
+
+/// Every frame, and what baking took.
+pub(crate) struct Reel {
+    pub(crate) frames: Vec<Frame>,
+    pub(crate) methods: Vec<String>,
+    pub(crate) bake_seconds: Vec<f64>,
+}
+
+/// Renders and measures; `each` gets every frame as it is done.
+pub(crate) fn shoot(
+    shot: &Shot<'_>,
+    each: &mut dyn FnMut(usize, &Frame) -> Result<(), Failure>,
+) -> Result<Reel, Failure> {
+    let (mut baked, mut bake_seconds) = (Vec::new(), Vec::new());
+    let first = shot.stage.set(shot.times[0])?;
+    for method in shot.methods {
+        let start = Instant::now();
+        let progress = Progress::new(&format!("bake {}", method.spelling()));
+        baked.push(BakedMaps::new(&first.materials, &**method, shot.precision, &|f| progress.set(f)));
+        bake_seconds.push(start.elapsed().as_secs_f64());
+    }
+    let mut frames = Vec::new();
+    let mut scene = Some(first);
+    for (at, time) in shot.times.iter().enumerate() {
+        let scene = match scene.take() {
+            Some(first) => first,
+            None => shot.stage.set(*time)?,
+        };
+        let frame = frame(shot, &scene, *time, &baked);
+        each(at, &frame)?;
+        frames.push(frame);
+    }
+    let methods = shot.methods.iter().map(|m| m.spelling()).collect();
+    Ok(Reel { frames, methods, bake_seconds })
+}
+
+fn frame(shot: &Shot<'_>, scene: &Scene, time: f64, baked: &[BakedMaps<'_>]) -> Frame {
+    let (size, exposure) = (shot.size, scene.exposure);
+    let geometry = Geometry::new(scene);
+    let start = Instant::now();
+    let brute = shot.truth.map(|effort| (Truth::new(scene, &geometry), effort));
+    let truth = brute.as_ref().map(|(truth, effort)| {
+        let progress = Progress::new("truth");
+        truth.render(&scene.camera, size, effort, &|f| progress.set(f))
+    });
+    let truth_seconds = start.elapsed().as_secs_f64();
+    let moving = |render: &dyn Fn(usize) -> Picture| {
+        let pictures: Vec<Picture> = (0..DRIFT_FRAMES).map(render).collect();
+        change(&pictures, exposure)
+    };
+    let drifting = brute.as_ref().filter(|_| shot.sparkle).map(|(truth, effort)| {
+        let progress = Progress::new("truth, drifting");
+        true_change(&truth.drift(&scene.camera, size, effort.rays, &|f| progress.set(f)), exposure)
+    });
+    let take = |maps: &BakedMaps<'_>| {
+        let filtered = Filtered { scene, geometry: &geometry, maps };
+        let start = Instant::now();
+        let picture = filtered.render(&scene.camera, size, shot.lookups);
+        let milliseconds = start.elapsed().as_secs_f64() * 1e3;
+        let errors = truth.as_ref().map(|truth| Errors {
+            relative_l2: relative_l2(&picture, &truth.picture),
+            color_error: color_error(&picture, &truth.picture, exposure),
+            flip: flip(&picture, &truth.picture, exposure),
+            sparkle: drifting.map(|drifting| {
+                let own = moving(&|i| filtered.render(&drifted(&scene.camera, i), size, shot.lookups));
+                own / drifting.change.max(f64::MIN_POSITIVE)
+            }),
+        });
+        Take { picture, milliseconds, errors }
+    };
+    let takes = baked.iter().map(take).collect();
+    Frame { time, exposure, truth, truth_seconds, drifting, takes }
+}
+
+/// How much the truth changes over a drift: [`change`] of its display values.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Drifting {
+    pub(crate) change: f64,
+    /// How much of that a truth of the same noise would show if nothing moved.
+    pub(crate) noise: f64,
+}
+
+fn true_change([a, b]: &[Vec<Picture>; 2], exposure: f32) -> Drifting {
+    let with = |weight: f32| -> Vec<Picture> {
+        let mean = |(a, b): (&Picture, &Picture)| {
+            Picture::from_fn(a.size(), |x, y| (a.row(y)[x] + weight * b.row(y)[x]) * 0.5)
+        };
+        a.iter().zip(b).map(mean).collect()
+    };
+    // Noise alone: the change of half the difference, on top of a picture that stands still.
+    let (still, half) = (with(1.0), with(-1.0));
+    let noisy: Vec<Picture> =
+        half.iter().map(|d| Picture::from_fn(d.size(), |x, y| still[0].row(y)[x] + d.row(y)[x])).collect();
+    Drifting { change: change(&still, exposure), noise: change(&noisy, exposure) }
+}
+
+/// Mean FLIP of display values, at the library's own distance to a screen.
+#[cfg(feature = "flip")]
+fn flip(picture: &Picture, truth: &Picture, exposure: f32) -> Option<f64> {
+    let image = |p: &Picture| {
+        let size = p.size();
+        let bytes = ndfmap_maps::picture::to_bytes(p, exposure);
+        nv_flip::FlipImageRgb8::with_data(
+            size.width as u32,
+            size.height as u32,
+            bytes.texels().as_flattened(),
+        )
+    };
+    let error = nv_flip::flip(image(truth), image(picture), nv_flip::DEFAULT_PIXELS_PER_DEGREE);
+    Some(f64::from(nv_flip::FlipPool::from_image(&error).mean()))
+}
+
+#[cfg(not(feature = "flip"))]
+fn flip(_picture: &Picture, _truth: &Picture, _exposure: f32) -> Option<f64> {
+    None
+}
+
+impl Errors {
+    /// As JSON.
+    pub(crate) fn to_json(self) -> Value {
+        let mut value = json!({ "relative_l2": self.relative_l2, "color_error": self.color_error });
+        if let Some(flip) = self.flip {
+            value["flip"] = flip.into();
+        }
+        if let Some(sparkle) = self.sparkle {
+            value["sparkle"] = sparkle.into();
+        }
+        value
+    }
+}
+
+impl Reel {
+    /// Mean over frames of a method's errors.
+    pub(crate) fn mean_errors(&self, method: usize) -> Option<Errors> {
+        let all: Option<Vec<Errors>> = self.frames.iter().map(|f| f.takes[method].errors).collect();
+        let all = all?;
+        let mean = |of: fn(&Errors) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
+        Some(Errors {
+            relative_l2: mean(|e| e.relative_l2),
+            color_error: mean(|e| e.color_error),
+            flip: all[0].flip.map(|_| mean(|e| e.flip.unwrap_or(0.0))),
+            sparkle: all[0].sparkle.map(|_| mean(|e| e.sparkle.unwrap_or(0.0))),
+        })
+    }
+
+    /// Milliseconds of a method's frames: median, least, most.
+    pub(crate) fn frame_ms(&self, method: usize) -> [f64; 3] {
+        let mut all: Vec<f64> = self.frames.iter().map(|f| f.takes[method].milliseconds).collect();
+        all.sort_by(f64::total_cmp);
+        [all[all.len() / 2], all[0], all[all.len() - 1]]
+    }
+
+    /// What is said about each method.
+    pub(crate) fn to_json(&self) -> Map<String, Value> {
+        let method = |(at, name): (usize, &String)| {
+            let [median, min, max] = self.frame_ms(at);
+            let mut value = json!({
+                "bake_seconds": self.bake_seconds[at],
+                "frame_ms": { "median": median, "min": min, "max": max },
+            });
+            if let Some(errors) = self.mean_errors(at) {
+                value["error"] = errors.to_json();
+                let frame = |f: &Frame| {
+                    let mut one = f.takes[at].errors.unwrap_or_default().to_json();
+                    one["time"] = f.time.into();
+                    one
+                };
+                value["frames"] = self.frames.iter().map(frame).collect();
+            }
+            (name.clone(), value)
+        };
+        self.methods.iter().enumerate().map(method).collect()
+    }
+
+    /// What is said about the truth, where there is one: rays a pixel, the worst noise, and the time of all frames.
+    pub(crate) fn truth_json(&self) -> Option<Value> {
+        let rays = self.frames.iter().filter_map(|f| f.truth.as_ref().map(|t| t.rays)).max()?;
+        let noise = self.frames.iter().filter_map(|f| f.truth.as_ref().map(|t| t.noise)).fold(0.0, f64::max);
+        let seconds: f64 = self.frames.iter().map(|f| f.truth_seconds).sum();
+        let mut value = json!({ "rays_per_pixel": rays, "noise": noise, "seconds": seconds });
+        if let Some(drifting) =
+            self.frames.iter().filter_map(|f| f.drifting).max_by(|a, b| a.noise.total_cmp(&b.noise))
+        {
+            value["drift"] = json!({ "change": drifting.change, "noise": drifting.noise });
+        }
+        Some(value)
+    }
+
+    /// The table for a terminal: a row a method.
+    pub(crate) fn to_table(&self) -> String {
+        let name = self.methods.iter().map(String::len).max().unwrap_or(0).max("method".len());
+        let mut text = format!("{:name$}  frame ms  color_error  relative_l2    FLIP  sparkle\n", "method");
+        for (at, method) in self.methods.iter().enumerate() {
+            let [median, ..] = self.frame_ms(at);
+            text += &format!("{method:name$} {median:>9.1}");
+            if let Some(e) = self.mean_errors(at) {
+                let or_dash = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+                text += &format!(
+                    "  {:>11.4}  {:>11.3}  {:>6}  {:>7}",
+                    e.color_error,
+                    e.relative_l2,
+                    or_dash(e.flip),
+                    or_dash(e.sparkle)
+                );
+            }
+            text.push('\n');
+        }
+        for f in &self.frames {
+            if let Some(truth) = &f.truth {
+                text += &format!(
+                    "truth at time {}: {} rays a pixel, noise {:.4}, {:.1} s\n",
+                    f.time, truth.rays, truth.noise, f.truth_seconds
+                );
+            }
+            if let Some(Drifting { change, noise }) = f.drifting {
+                text += &format!("drifting: it changes by {change:.4} a step, {noise:.4} of that by noise\n");
+            }
+        }
+        text
+    }
+}

@@ -1,0 +1,84 @@
+//! From what the command line asks for to a scene: built-in or from a file, with its own camera, lights and lobe or others.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+use ndfmap_core::grid::Size;
+use ndfmap_core::light::Light;
+use ndfmap_core::reflection::Model;
+use ndfmap_core::scene::{self, Camera, Scene, Staging};
+use ndfmap_core::surface::Surface;
+use ndfmap_maps::model::{ModelOptions, is_model, read_model};
+
+use crate::Failure;
+
+/// A scene as asked for; what is `None` or empty stays as the scene has it.
+#[derive(Clone, Default)]
+pub(crate) struct Stage {
+    /// Name of a built-in scene, or a model file.
+    pub(crate) scene: String,
+    /// Map of the first material, and a name for it.
+    pub(crate) map: Option<Arc<dyn Surface>>,
+    /// Size of built-in maps.
+    pub(crate) map_size: Option<Size>,
+    pub(crate) brdf: Option<String>,
+    pub(crate) model: Option<Model>,
+    pub(crate) camera: Option<CameraArgument>,
+    pub(crate) lights: Vec<Light>,
+    pub(crate) exposure: Option<f64>,
+}
+
+/// A camera as spelled.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CameraArgument {
+    pub(crate) eye: DVec3,
+    pub(crate) target: DVec3,
+    pub(crate) degrees: Option<f64>,
+}
+
+impl Stage {
+    /// The scene at a time.
+    pub(crate) fn set(&self, time: f64) -> Result<Scene, Failure> {
+        let mut staging = Staging { time, map: self.map.clone(), ..Staging::default() };
+        if let Some(size) = self.map_size {
+            staging.map_size = size;
+        }
+        let path = Path::new(&self.scene);
+        let mut scene = match scene::find(&self.scene) {
+            Some(row) => (row.build)(&staging),
+            None if is_model(path) => {
+                let (scene, warnings) = read_model(path, &ModelOptions { staging })?;
+                warnings.iter().for_each(|w| eprintln!("ndfmap: warning: {}: {w}", path.display()));
+                scene
+            }
+            None => {
+                return Err(Failure::Usage(format!(
+                    "there is no scene `{}`: neither a built-in one ({}) nor a model file (.gltf, .glb, .obj, .ply)",
+                    self.scene,
+                    scene::TABLE.iter().map(|row| row.name).collect::<Vec<_>>().join(", ")
+                )));
+            }
+        };
+        if let Some(brdf) = &self.brdf {
+            scene.set_brdf(brdf).map_err(|e| Failure::Usage(e.to_string()))?;
+        }
+        if let Some(model) = self.model {
+            scene.set_model(model);
+        }
+        if let Some(camera) = self.camera {
+            let degrees = camera.degrees.unwrap_or(scene.camera.degrees);
+            scene.camera = Camera {
+                shift: DVec2::ZERO,
+                ..Camera::new(camera.eye.into(), camera.target.into(), degrees)
+            };
+        }
+        if !self.lights.is_empty() {
+            scene.lights.clone_from(&self.lights);
+        }
+        if let Some(exposure) = self.exposure {
+            scene.exposure = exposure as f32;
+        }
+        Ok(scene)
+    }
+}
