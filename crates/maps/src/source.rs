@@ -1,6 +1,7 @@
 //! Sources: pictures, and built-in surfaces, read as normal maps or height maps.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use fearless_simd::{Level, dispatch};
 use glam::Vec3;
@@ -76,7 +77,7 @@ impl Default for SourceOptions {
 /// A source, ready to be baked.
 pub struct SourceMap {
     /// The finest level.
-    pub surface: Box<dyn Surface>,
+    pub surface: Arc<dyn Surface>,
     /// What it is, for headers.
     pub source: Source,
     /// What was odd about it.
@@ -138,7 +139,7 @@ fn builtin(map: &Path, name: &str, options: &SourceOptions) -> Result<SourceMap,
     } else {
         vec!["is built in: only its size can be chosen, other source options do nothing".to_owned()]
     };
-    Ok(SourceMap { surface, source, warnings })
+    Ok(SourceMap { surface: surface.into(), source, warnings })
 }
 
 /// Takes a decoded picture as a surface.
@@ -155,7 +156,7 @@ pub fn source_of_image(
     let kind =
         options.kind.unwrap_or_else(|| if is_grey(&image) { SourceKind::Height } else { SourceKind::Normal });
     let file = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let (surface, height_scale, convention): (Box<dyn Surface>, _, _) = match kind {
+    let (surface, height_scale, convention): (Arc<dyn Surface>, _, _) = match kind {
         SourceKind::Height => {
             if options.kind.is_none() && image.channels > 1 {
                 warnings.push(
@@ -163,14 +164,14 @@ pub fn source_of_image(
                 );
             }
             let field = height_field(path, &image, options, &mut warnings)?;
-            (Box::new(field), Some(options.height_scale), None)
+            (Arc::new(field), Some(options.height_scale), None)
         }
         SourceKind::Normal => {
             if options.height_scale != DEFAULT_HEIGHT_SCALE || options.invert {
                 warnings.push("is taken as normals: `--height-scale` and `--invert` do nothing".to_owned());
             }
             let normals = EncodedNormals::new(path, image, options, &mut warnings)?;
-            (Box::new(normals), None, Some(options.convention.name().to_owned()))
+            (Arc::new(normals), None, Some(options.convention.name().to_owned()))
         }
     };
     Ok(SourceMap { surface, source: Source { file, kind, sha256, height_scale, convention }, warnings })

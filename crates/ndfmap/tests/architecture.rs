@@ -38,7 +38,9 @@ fn arrows_point_one_way() {
 #[test]
 fn truth_shares_no_representation() {
     for file in tracked().iter().filter(|f| f.starts_with("crates/trace/src/truth")) {
-        let used = read(file).lines().any(|l| !l.starts_with("//!") && (l.contains("::ndf") || l.contains("filtered")));
+        let used = read(file)
+            .lines()
+            .any(|l| !l.starts_with("//!") && (l.contains("::ndf") || l.contains("filtered")));
         assert!(!used, "{} uses what it is to judge", file.display());
     }
 }

@@ -105,7 +105,7 @@ fn percent_decoded(uri: &str) -> String {
 
 /// A normal map with its x and y scaled, as `normalTexture.scale` asks.
 struct Scaled {
-    inner: Box<dyn Surface>,
+    inner: Arc<dyn Surface>,
     scale: f32,
 }
 
@@ -174,7 +174,7 @@ impl Files<'_> {
                 let map = source_of_image(&file, image, String::new(), &options)?;
                 warnings.extend(map.warnings.iter().map(|w| format!("normal map of `{name}` {w}")));
                 if normal.scale() == 1.0 {
-                    Arc::from(map.surface)
+                    map.surface
                 } else {
                     Arc::new(Scaled { inner: map.surface, scale: normal.scale() })
                 }

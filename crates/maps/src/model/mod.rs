@@ -81,14 +81,25 @@ pub fn is_model(path: &Path) -> bool {
 /// # Errors
 /// [`MapError`] when it, or a file that it names, cannot be read.
 pub fn read_model(path: &Path, options: &ModelOptions) -> Result<(Scene, Vec<String>), MapError> {
+    model_of_bytes(path, &read_file(path)?, options)
+}
+
+/// Takes a whole file in memory as a model; its name says of which format, and where the files are that it names.
+///
+/// # Errors
+/// [`MapError`] when it, or a file that it names, cannot be read.
+pub fn model_of_bytes(
+    path: &Path,
+    bytes: &[u8],
+    options: &ModelOptions,
+) -> Result<(Scene, Vec<String>), MapError> {
     let format = format_of(path).ok_or_else(|| {
         let names: Vec<&str> = TABLE.iter().map(|f| f.name).collect();
         MapError::unsupported(path, format!("is no model; models are {}", names.join(", ")))
     })?;
-    let bytes = read_file(path)?;
     let mut warnings = Vec::new();
     // What decoders assert about hostile files is caught: it is the file that is wrong.
-    let read = std::panic::AssertUnwindSafe(|| (format.read)(path, &bytes, &mut warnings));
+    let read = std::panic::AssertUnwindSafe(|| (format.read)(path, bytes, &mut warnings));
     let damaged = || {
         MapError::invalid(path, format!("is damaged in a way that the {} reader cannot handle", format.name))
     };

@@ -1,20 +1,28 @@
 //! `ndfmap compare`: the error of each method against the truth, level by level.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::Args;
 use ndfmap_core::brdf;
+use ndfmap_core::grid::Size;
 use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid;
 use ndfmap_maps::source::{SourceMap, read_source};
+use ndfmap_trace::filtered::Lookups;
+use ndfmap_trace::truth::Effort;
 
 use super::arguments::{
-    BuiltinSize, Precision, SourceArguments, brdf_spelling, brdfs_help, method, method_spelling, methods_help,
+    BuiltinSize, Precision, SourceArguments, brdf_spelling, brdfs_help, method, method_spelling,
+    methods_help, size,
 };
+use super::render::FilterArguments;
 use super::{print, print_json, say_if_replaced, warn};
 use crate::Failure;
+use crate::imaging::{Reel, Shot, shoot};
 use crate::measure::{self, Comparison, Subject};
 use crate::report::{self, Pages};
+use crate::staging::Stage;
 
 /// What every comparison carries unless told otherwise: the baselines, each linear method, and mixtures.
 pub(super) const DEFAULT_METHODS: &str =
@@ -41,6 +49,21 @@ pub(super) struct Compare {
     /// Also write a report with pictures and plots into this folder
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
+    /// Also render the map in a scene, and measure pictures: a built-in scene, or a model file
+    #[arg(long, value_name = "NAME|FILE")]
+    scene: Option<String>,
+    /// Rays a pixel of the true picture
+    #[arg(long, value_name = "RAYS", default_value_t = 256, requires = "scene",
+        value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    truth: u32,
+    /// Size of the pictures
+    #[arg(long, value_name = "SIZE", default_value = "256", value_parser = size, requires = "scene")]
+    picture: Size,
+    /// Also measure how each method sparkles as the camera drifts by a pixel
+    #[arg(long, requires = "scene")]
+    sparkle: bool,
+    #[command(flatten)]
+    filter: FilterArguments,
     #[command(flatten)]
     source: SourceArguments,
     #[command(flatten)]
@@ -67,32 +90,76 @@ impl Compare {
             brdf: &self.brdf,
             precision: self.precision.into(),
             filtering: self.filtering,
+            pictures: self.scene.as_ref().map(|scene| Pictures {
+                stage: Stage {
+                    scene: scene.clone(),
+                    map: Some(Arc::clone(&map.surface)),
+                    brdf: Some(self.brdf.clone()),
+                    ..Stage::default()
+                },
+                times: vec![0.0],
+                size: self.picture,
+                lookups: self.filter.lookups(),
+                truth: Effort { rays: self.truth as usize, noise: 0.0, seed: 0 },
+                sparkle: self.sparkle,
+            }),
         };
-        let (comparison, written) = run.measure(self.report.as_deref())?;
+        let Measured { comparison, reel, written } = run.measure(self.report.as_deref())?;
         for file in written {
             eprintln!("ndfmap: wrote {}", file.display());
         }
-        if json { print_json(&comparison.to_json(&map.source.file)) } else { print(&comparison.to_table()) }
+        if !json {
+            let pictures = reel.map_or_else(String::new, |reel| format!("\npictures\n\n{}", reel.to_table()));
+            return print(&(comparison.to_table() + &pictures));
+        }
+        let mut value = comparison.to_json(&map.source.file);
+        if let (Some(reel), Some(scene)) = (reel, self.scene) {
+            value["scene"] = scene.into();
+            value["truth"] = reel.truth_json().unwrap_or_default();
+            for (method, measured) in reel.to_json() {
+                value["methods"][method]["picture"] = measured;
+            }
+        }
+        print_json(&value)
     }
 }
 
-/// A comparison of a source, perhaps with a report.
+/// A comparison of a source, perhaps with pictures and a report.
 pub(super) struct Run<'a> {
     pub(super) map: &'a SourceMap,
     pub(super) methods: &'a [Box<dyn Method>],
     pub(super) brdf: &'a str,
     pub(super) precision: pyramid::Precision,
     pub(super) filtering: bool,
+    pub(super) pictures: Option<Pictures>,
+}
+
+/// Pictures to be measured.
+pub(super) struct Pictures {
+    pub(super) stage: Stage,
+    pub(super) times: Vec<f64>,
+    pub(super) size: Size,
+    pub(super) lookups: Lookups,
+    pub(super) truth: Effort,
+    pub(super) sparkle: bool,
+}
+
+/// What came of it.
+pub(super) struct Measured {
+    pub(super) comparison: Comparison,
+    pub(super) reel: Option<Reel>,
+    pub(super) written: Vec<PathBuf>,
 }
 
 impl Run<'_> {
-    /// Measures; with a folder, writes the report and returns the files written.
-    pub(super) fn measure(&self, folder: Option<&Path>) -> Result<(Comparison, Vec<PathBuf>), Failure> {
-        // A folder that cannot be made should be known before the minutes of measuring, not after.
+    /// Measures; with a folder, writes the report.
+    pub(super) fn measure(&self, folder: Option<&Path>) -> Result<Measured, Failure> {
+        // A folder that cannot be made, or a scene that is not there, should be known before the minutes of measuring.
         if let Some(folder) = folder {
             std::fs::create_dir_all(folder).map_err(|e| ndfmap_maps::MapError::io(folder, e))?;
         }
         let brdf = brdf::parse(self.brdf).map_err(|e| Failure::Usage(e.to_string()))?;
+        let reel = self.pictures.as_ref().map(|pictures| self.shoot(pictures)).transpose()?;
         let subject = Subject {
             surface: &*self.map.surface,
             brdf: &*brdf,
@@ -101,20 +168,36 @@ impl Run<'_> {
             filtering: self.filtering,
         };
         let comparison = measure::compare(&subject);
-        let Some(folder) = folder else { return Ok((comparison, Vec::new())) };
-        let pages = Pages {
-            subject: &subject,
-            comparison: &comparison,
-            source: &self.map.source,
-            warnings: &self.map.warnings,
-        };
         let mut written = Vec::new();
-        for (name, bytes) in report::draw(&pages)? {
-            let path = folder.join(name);
-            say_if_replaced(&path);
-            ndfmap_maps::atomic::write(&path, &bytes)?;
-            written.push(path);
+        if let Some(folder) = folder {
+            let pages = Pages {
+                subject: &subject,
+                comparison: &comparison,
+                reel: reel.as_ref(),
+                source: &self.map.source,
+                warnings: &self.map.warnings,
+            };
+            for (name, bytes) in report::draw(&pages)? {
+                let path = folder.join(name);
+                say_if_replaced(&path);
+                ndfmap_maps::atomic::write(&path, &bytes)?;
+                written.push(path);
+            }
         }
-        Ok((comparison, written))
+        Ok(Measured { comparison, reel, written })
+    }
+
+    fn shoot(&self, pictures: &Pictures) -> Result<Reel, Failure> {
+        let shot = Shot {
+            stage: &pictures.stage,
+            times: &pictures.times,
+            methods: self.methods,
+            size: pictures.size,
+            precision: self.precision,
+            lookups: pictures.lookups,
+            truth: Some(pictures.truth),
+            sparkle: pictures.sparkle,
+        };
+        shoot(&shot, &mut |_, _| Ok(()))
     }
 }

@@ -5,15 +5,22 @@ use std::time::Instant;
 
 use clap::Args;
 use ndfmap_core::bake::Bake;
+use ndfmap_core::grid::Size;
+use ndfmap_core::lookup::Filtering;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_maps::formats::ktx2::Ktx2Sink;
 use ndfmap_maps::source::{SourceOptions, read_source};
+use ndfmap_trace::filtered::Lookups;
+use ndfmap_trace::truth::Effort;
 
 use super::arguments::method;
 use super::bake::header_of;
-use super::compare::{DEFAULT_METHODS, Run};
+use super::compare::{DEFAULT_METHODS, Measured, Run};
 use super::{print, print_json, say_if_replaced};
 use crate::Failure;
+use crate::imaging::{Shot, shoot};
+use crate::report::pictures;
+use crate::staging::Stage;
 
 /// Show what distance does to a built-in map, and what each method saves
 #[derive(Debug, Args)]
@@ -29,6 +36,30 @@ const MAP: &str = "builtin:foil";
 /// Sharp enough to sparkle, wide enough that no method is out of its depth.
 const BRDF: &str = "blinn-phong:50";
 
+/// Contact sheets of scenes: file, scene, and when.
+const SHEETS: [(&str, &str, &[f64]); 2] =
+    [("disk.png", "disk", &[0.1, 0.4, 0.7]), ("plane.png", "plane", &[0.0])];
+
+/// What they show beside the truth: what renderers do, what they might, and ours.
+const SHOWN: [&str; 3] = ["naive", "toksvig", "vmf:4"];
+
+/// A contact sheet of a scene, as a PNG file.
+fn sheet(scene: &str, times: &[f64]) -> Result<Vec<u8>, Failure> {
+    let methods = SHOWN.iter().map(|m| method(m)).collect::<Result<Vec<_>, _>>()?;
+    let stage = Stage { scene: scene.to_owned(), ..Stage::default() };
+    let shot = Shot {
+        stage: &stage,
+        times,
+        methods: &methods,
+        size: Size { width: 224, height: 224 },
+        precision: Precision::Half,
+        lookups: Lookups { filtering: Filtering::fine(16), ..Lookups::TRILINEAR },
+        truth: Some(Effort { rays: 128, noise: 0.0, seed: 0 }),
+        sparkle: false,
+    };
+    pictures::draw(&shoot(&shot, &mut |_, _| Ok(()))?, scene)
+}
+
 impl Demo {
     pub(super) fn run(self, json: bool) -> Result<(), Failure> {
         let start = Instant::now();
@@ -37,9 +68,21 @@ impl Demo {
         for spelling in DEFAULT_METHODS.split(',') {
             methods.push(method(spelling)?);
         }
-        let run =
-            Run { map: &map, methods: &methods, brdf: BRDF, precision: Precision::Half, filtering: false };
-        let (comparison, mut written) = run.measure(Some(&self.output))?;
+        let run = Run {
+            map: &map,
+            methods: &methods,
+            brdf: BRDF,
+            precision: Precision::Half,
+            filtering: false,
+            pictures: None,
+        };
+        let Measured { comparison, mut written, .. } = run.measure(Some(&self.output))?;
+        for (name, scene, times) in SHEETS {
+            let path = self.output.join(name);
+            say_if_replaced(&path);
+            ndfmap_maps::atomic::write(&path, &sheet(scene, times)?)?;
+            written.push(path);
+        }
 
         let path = self.output.join("foil.slopes.ktx2");
         say_if_replaced(&path);

@@ -287,7 +287,7 @@ impl Render {
                 let size = self.map_size.unwrap_or(Size { width: 512, height: 512 });
                 let map = read_source(path, &self.source.options(size))?;
                 map.warnings.iter().for_each(|w| warn(path, w));
-                Some(map.surface.into())
+                Some(map.surface)
             }
             None => None,
         };

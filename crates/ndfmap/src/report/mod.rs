@@ -14,12 +14,15 @@ use ndfmap_core::filtering::FilteringError;
 use ndfmap_maps::Source;
 
 use crate::Failure;
+use crate::imaging::Reel;
 use crate::measure::{Comparison, Subject, three_digits};
 
 /// What a report is drawn from.
 pub(crate) struct Pages<'a> {
     pub(crate) subject: &'a Subject<'a>,
     pub(crate) comparison: &'a Comparison,
+    /// Pictures of a scene, where asked for.
+    pub(crate) reel: Option<&'a Reel>,
     pub(crate) source: &'a Source,
     pub(crate) warnings: &'a [String],
 }
@@ -33,7 +36,14 @@ pub(crate) fn draw(pages: &Pages<'_>) -> Result<Vec<(&'static str, Vec<u8>)>, Fa
     let between = asked.then(|| between::draw(pages.subject, pages.comparison)).flatten();
     let between = between.map(|canvas| canvas.to_png()).transpose()?;
     let plot = plot::errors_by_level(pages.comparison)?;
-    let figures = Figures { sheet: &sheet, disks: &disks, between: between.as_deref(), plot: &plot };
+    let scene = pages.reel.map(|reel| pictures::draw(reel, &pages.source.file)).transpose()?;
+    let figures = Figures {
+        sheet: &sheet,
+        disks: &disks,
+        between: between.as_deref(),
+        scene: scene.as_deref(),
+        plot: &plot,
+    };
     let html = page(pages, &figures)?;
     let json = format!("{:#}\n", pages.comparison.to_json(&pages.source.file));
     let mut files = vec![
@@ -43,6 +53,7 @@ pub(crate) fn draw(pages: &Pages<'_>) -> Result<Vec<(&'static str, Vec<u8>)>, Fa
         ("compare.json", json.into_bytes()),
     ];
     files.extend(between.map(|between| ("alignment.png", between)));
+    files.extend(scene.map(|scene| ("scene.png", scene)));
     Ok(files)
 }
 
@@ -51,6 +62,7 @@ struct Figures<'a> {
     sheet: &'a [u8],
     disks: &'a [u8],
     between: Option<&'a [u8]>,
+    scene: Option<&'a [u8]>,
     plot: &'a str,
 }
 
@@ -99,6 +111,7 @@ fn page(pages: &Pages<'_>, figures: &Figures<'_>) -> Result<String, Failure> {
             sheet => STANDARD.encode(figures.sheet),
             disks => STANDARD.encode(figures.disks),
             between => figures.between.map(|b| STANDARD.encode(b)),
+            scene => figures.scene.map(|s| STANDARD.encode(s)),
             filtering => filtering,
             version => env!("CARGO_PKG_VERSION"),
         })
