@@ -26,6 +26,9 @@ pub(crate) struct Stage {
     pub(crate) model: Option<Model>,
     pub(crate) camera: Option<CameraArgument>,
     pub(crate) lights: Vec<Light>,
+    /// Colours of the first material.
+    pub(crate) diffuse: Option<DVec3>,
+    pub(crate) specular: Option<DVec3>,
     pub(crate) exposure: Option<f64>,
 }
 
@@ -60,6 +63,13 @@ impl Stage {
                 )));
             }
         };
+        if let Some(first) = scene.materials.first_mut()
+            && (self.diffuse.is_some() || self.specular.is_some())
+        {
+            first.finish.diffuse = self.diffuse.unwrap_or(first.finish.diffuse);
+            first.finish.specular = self.specular.unwrap_or(first.finish.specular);
+            first.finish_map = None;
+        }
         if let Some(brdf) = &self.brdf {
             scene.set_brdf(brdf).map_err(|e| Failure::Usage(e.to_string()))?;
         }

@@ -128,3 +128,27 @@ fn ktx2_files_open_in_an_independent_reader() {
         }
     }
 }
+
+#[test]
+fn truth_agrees_with_mitsuba() {
+    let python = root().join(".venv/bin/python");
+    if !available(&python, "Mitsuba for Python") {
+        return;
+    }
+    let output = Command::new(python)
+        .arg(root().join("tests/interop/mitsuba_plane.py"))
+        .arg(env!("CARGO_BIN_EXE_ndfmap"))
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let rows: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(rows.as_array().unwrap().len(), 4);
+    for row in rows.as_array().unwrap() {
+        eprintln!("{row}");
+        let [mean, l2, noise] = ["mean", "l2", "noise"].map(|key| row[key].as_f64().unwrap());
+        // 1296 pixels of independent noise: the norm of the difference strays by 1/sqrt(2592) = 2 % of itself, but the
+        // bright ones weigh most; 15 % leaves room for them. The mean of all strays by noise/36, times the same.
+        assert!(l2 < 1.15 * noise, "{row}");
+        assert!(mean < 4.5 * noise / 36.0, "{row}");
+    }
+}

@@ -62,6 +62,12 @@ impl Brdf for Ggx {
         Some(SlopeVariance::clamped(self.alpha_squared / 2.0))
     }
 
+    /// Walter et al.'s equation 34.
+    fn masking(&self, u: f64, width: SlopeVariance) -> f64 {
+        let tan_squared = ((1.0 - u * u) / (u * u)).max(0.0);
+        2.0 / (1.0 + (1.0 + 2.0 * width.get() * tan_squared).sqrt())
+    }
+
     fn widen(&self, by: SlopeVariance) -> Box<dyn Brdf> {
         Box::new(self.widened(by))
     }

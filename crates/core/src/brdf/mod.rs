@@ -55,6 +55,12 @@ pub trait Brdf: Send + Sync + Debug {
     /// [`Self::widen`], then [`Self::evaluate`], without a lobe on the heap: what a pixel asks of a lobe, once.
     fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64;
 
+    /// Smith's masking (Walter et al. 2007, section 5.1) at cosine `u > 0` to the normal, of a lobe of this kind that is
+    /// `width` wide; Beckmann's, where a lobe has none of its own.
+    fn masking(&self, u: f64, width: SlopeVariance) -> f64 {
+        beckmann::masking(u, width)
+    }
+
     /// Zonal coefficients `rho_l = 2 pi ∫ f(u) P_l(u) du` for l = 0..`order` (Han et al., equation 8).
     ///
     /// Closed forms or recurrences where there are any; else [`zonal_by_quadrature`].

@@ -61,6 +61,10 @@ impl Representation for Fixed {
         UnitMean::new(xy.extend((1.0 - xy.length_squared()).max(0.0).sqrt()))
     }
 
+    fn mean(&self, lobes: &UnitMean) -> DVec3 {
+        lobes.alone().mean
+    }
+
     fn effective<'a>(&'a self, lobes: &UnitMean, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         lobes.effective(brdf)
     }

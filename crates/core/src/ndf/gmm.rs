@@ -8,7 +8,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::mixture::{Cosine, Lobes, MixtureEvaluator, Shaded, effective, parse_mixture};
+use super::mixture::{Cosine, Lobes, MixtureEvaluator, Shaded, effective, mean_of, parse_mixture};
 use super::{Decoded, Evaluator, Method, PlanarLobe, Representation, Row, Sample};
 use crate::brdf::Brdf;
 use crate::fit::{Fit, Four, LobeKind};
@@ -122,6 +122,10 @@ impl Representation for Gmm {
 
     fn decode(&self, sums: &Lobes) -> GaussianMixture {
         GaussianMixture { lobes: self.lobes(sums) }
+    }
+
+    fn mean(&self, lobes: &GaussianMixture) -> DVec3 {
+        mean_of(&lobes.lobes)
     }
 
     fn effective<'a>(

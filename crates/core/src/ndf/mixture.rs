@@ -96,6 +96,16 @@ impl Shaded {
     }
 }
 
+/// Mean normal of lobes, a lobe's own being shorter the wider it is.
+pub(super) fn mean_of(lobes: &[Shaded]) -> DVec3 {
+    let (mut sum, mut total) = (DVec3::ZERO, 0.0);
+    for lobe in lobes {
+        sum += lobe.weight * lobe.direction() / (1.0 + lobe.variance.get());
+        total += lobe.weight;
+    }
+    if total > 0.0 { sum / total } else { DVec3::Z }
+}
+
 /// Reads `J[:ALIGNMENT][:WORD]`; the second result says whether the word was there.
 pub(super) fn parse_mixture(
     words: &[&str],

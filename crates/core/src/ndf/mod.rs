@@ -91,6 +91,9 @@ pub trait Representation: Debug + Send + Sync {
     /// The effective lobe `w ↦ ∫ f(w·n) gamma(n) dn` under this distribution.
     fn effective<'a>(&'a self, lobes: &Self::Lobes, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a>;
 
+    /// The mean normal, whose length says how far the normals stray.
+    fn mean(&self, lobes: &Self::Lobes) -> DVec3;
+
     /// The distribution as a sum of isotropic lobes, and the cosine that they are a function of, where it is one.
     fn isotropic(&self, _lobes: &Self::Lobes) -> Option<(Cosine, Vec<Shaded>)> {
         None

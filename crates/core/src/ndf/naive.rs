@@ -89,6 +89,10 @@ impl Representation for Naive {
         UnitMean::new(sums.as_dvec3())
     }
 
+    fn mean(&self, lobes: &UnitMean) -> DVec3 {
+        lobes.alone().mean
+    }
+
     fn effective<'a>(&'a self, lobes: &UnitMean, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         lobes.effective(brdf)
     }

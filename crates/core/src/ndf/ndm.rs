@@ -318,6 +318,10 @@ impl Representation for Ndm {
         SpaceGaussian { mean: p + DVec3::Z, covariance, factors: sums.factors.map(f64::from) }
     }
 
+    fn mean(&self, lobes: &SpaceGaussian) -> DVec3 {
+        lobes.mean
+    }
+
     fn effective<'a>(&'a self, lobes: &SpaceGaussian, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         let g = *lobes;
         let Some(base) = brdf.slope_variance() else {

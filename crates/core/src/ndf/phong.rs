@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::mixture::{Cosine, Lobes, MixtureEvaluator, Shaded, cosine, effective};
+use super::mixture::{Cosine, Lobes, MixtureEvaluator, Shaded, cosine, effective, mean_of};
 use super::{Decoded, Evaluator, Method, MixtureLobe, Representation, Row, Sample};
 use crate::brdf::Brdf;
 use crate::fit::{Alignment, Fit, Four, LobeKind, MAX_LOBES, SHARPEST};
@@ -111,6 +111,10 @@ impl Representation for Phong {
 
     fn decode(&self, sums: &Lobes) -> PhongPeaks {
         PhongPeaks { peaks: Self::peaks(sums) }
+    }
+
+    fn mean(&self, lobes: &PhongPeaks) -> DVec3 {
+        mean_of(&lobes.peaks)
     }
 
     fn effective<'a>(&'a self, peaks: &PhongPeaks, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::{Representation, Shaded};
+use super::{Representation, Shaded, direction_or_up};
 use crate::brdf::{Brdf, Lambert};
 use crate::reflection::{Finish, Reflection, Way};
 use crate::units::SlopeVariance;
@@ -47,9 +47,17 @@ pub(super) fn reflect<R: Representation + ?Sized>(
         let lobe = representation.effective(&decoded, widened.as_deref().unwrap_or(&*reflection.lobe));
         let diffuse = representation.effective(&decoded, &Lambert::SHARP);
         let width = reflection.width(finish.gloss);
+        let mean = representation.mean(&decoded);
+        let length = mean.length().clamp(1e-3, 1.0);
+        let whole = Shaded::alone(direction_or_up(mean), SlopeVariance::clamped((1.0 - length) / length));
         let of = |light: &Lit| {
             let specular = if reflection.is_specular() {
-                lobe(light.way.wh) * reflection.model.factor(light.way.wh, &light.way, width)
+                let n = if texel.at_means {
+                    whole.mean
+                } else {
+                    answering(&whole, whole.mean, width, light.way.wh)
+                };
+                lobe(light.way.wh) * reflection.factor(n, &light.way, finish.gloss)
             } else {
                 0.0
             };
@@ -70,7 +78,7 @@ pub(super) fn reflect<R: Representation + ?Sized>(
             };
             let specular = if f > 0.0 {
                 let n = if texel.at_means { mu } else { answering(lobe, mu, base, way.wh) };
-                f * reflection.model.factor(n, way, base)
+                f * reflection.factor(n, way, finish.gloss)
             } else {
                 0.0
             };

@@ -4,6 +4,8 @@
 //! lobe's zonal coefficients `rho_l`. What rings below zero is clamped to zero. `sh:L:printed` uses the
 //! paper's `exp` approximations of `rho_l` in place of the exact ones, to show the difference.
 
+use std::f64::consts::PI;
+
 use glam::DVec3;
 
 use super::{Decoded, Evaluator, FlatLobe, Method, Representation, Row, Sample};
@@ -131,6 +133,12 @@ impl Representation for Sh {
 
     fn decode(&self, sums: &Coefficients) -> Coefficients {
         *sums
+    }
+
+    /// `Y_1 = sqrt(3/4 pi) (y, z, x)`.
+    fn mean(&self, lobes: &Coefficients) -> DVec3 {
+        let [_, y, z, x, ..] = lobes.gamma;
+        DVec3::new(x.into(), y.into(), z.into()) * (4.0 * PI / 3.0).sqrt()
     }
 
     fn effective<'a>(&'a self, lobes: &Coefficients, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {

@@ -14,7 +14,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 use super::{Decoded, Representation, Row, Sample, no_parameters};
 use crate::brdf::Brdf;
-use crate::surface::{SurfaceRow, slope_of_normal};
+use crate::surface::{SurfaceRow, normal_of_slope, slope_of_normal};
 use crate::units::SlopeVariance;
 
 /// Moments of the slope.
@@ -183,6 +183,11 @@ impl Representation for Slopes {
         let limit = (xx * yy).sqrt();
         let covariance = [xx, yy, (xy - x * y).clamp(-limit, limit)];
         SlopeGaussian { height: f64::from(sums.height), mean: DVec2::new(x, y), covariance }
+    }
+
+    fn mean(&self, lobes: &SlopeGaussian) -> DVec3 {
+        normal_of_slope(lobes.mean.as_vec2()).as_dvec3()
+            / (1.0 + 0.5 * (lobes.covariance[0] + lobes.covariance[1]))
     }
 
     fn effective<'a>(&'a self, lobes: &SlopeGaussian, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {

@@ -81,6 +81,10 @@ impl Representation for Toksvig {
         Lobe { mean, variance: SlopeVariance::clamped((1.0 - length) / length) }
     }
 
+    fn mean(&self, lobes: &Lobe) -> DVec3 {
+        lobes.mean
+    }
+
     fn effective<'a>(&'a self, lobes: &Lobe, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         let (mu, widened) = (direction_or_up(lobes.mean), brdf.widen(lobes.variance));
         Box::new(move |w| widened.evaluate(w.dot(mu)))

@@ -10,7 +10,7 @@
 
 use glam::DVec3;
 
-use super::mixture::{Cosine, Lobes, MixtureEvaluator, Shaded, cosine, effective, parse_mixture};
+use super::mixture::{Cosine, Lobes, MixtureEvaluator, Shaded, cosine, effective, mean_of, parse_mixture};
 use super::{Decoded, Evaluator, Method, MixtureLobe, Representation, Row, Sample};
 use crate::brdf::Brdf;
 use crate::fit::{Fit, Four, LobeKind, from_pole};
@@ -132,6 +132,10 @@ impl Representation for Vmf {
 
     fn decode(&self, sums: &Lobes) -> VmfMixture {
         VmfMixture { lobes: Self::lobes(sums) }
+    }
+
+    fn mean(&self, lobes: &VmfMixture) -> DVec3 {
+        mean_of(&lobes.lobes)
     }
 
     fn effective<'a>(&'a self, lobes: &VmfMixture, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {

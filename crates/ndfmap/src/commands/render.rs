@@ -80,6 +80,12 @@ pub(super) struct Render {
     /// What goes with the lobe: Tan et al.'s, Han et al.'s or Smith's factor
     #[arg(long, value_enum)]
     model: Option<ModelArgument>,
+    /// Diffuse albedo R,G,B of the first material, in place of its own and of its textures
+    #[arg(long, value_name = "R,G,B", value_parser = colour)]
+    diffuse: Option<DVec3>,
+    /// Reflectance R,G,B at normal incidence of the first material, in place of its own and of its textures
+    #[arg(long, value_name = "R,G,B", value_parser = colour)]
+    specular: Option<DVec3>,
     #[command(flatten)]
     filter: FilterArguments,
     /// Display values are sRGB of light times this
@@ -172,6 +178,16 @@ fn three(text: &str) -> Result<DVec3, String> {
     }
 }
 
+fn colour(text: &str) -> Result<DVec3, String> {
+    let all = numbers(text)?;
+    let colour = match all[..] {
+        [grey] => DVec3::splat(grey),
+        [r, g, b] => DVec3::new(r, g, b),
+        _ => return Err("a colour is one number or three".to_owned()),
+    };
+    if colour.min_element() < 0.0 { Err("a colour must not be below 0".to_owned()) } else { Ok(colour) }
+}
+
 fn camera(text: &str) -> Result<CameraArgument, String> {
     let all = numbers(text)?;
     let (eye, target, degrees) = match all[..] {
@@ -195,10 +211,7 @@ fn camera(text: &str) -> Result<CameraArgument, String> {
 fn light(text: &str) -> Result<Light, String> {
     let (point, rest) = text.strip_prefix("point:").map_or((false, text), |rest| (true, rest));
     let (place, colour) = rest.split_once(':').unwrap_or((rest, "3,3,3"));
-    let (place, colour) = (three(place)?, three(colour)?);
-    if colour.min_element() < 0.0 {
-        return Err("a colour must not be below 0".to_owned());
-    }
+    let (place, colour) = (three(place)?, self::colour(colour)?);
     if point {
         return Ok(Light::Point { at: place, intensity: colour });
     }
@@ -303,6 +316,8 @@ impl Render {
             }),
             camera: self.camera,
             lights: self.light.clone(),
+            diffuse: self.diffuse,
+            specular: self.specular,
             exposure: self.exposure,
         })
     }

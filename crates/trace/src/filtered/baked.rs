@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use ndfmap_core::bake::Bake;
-use ndfmap_core::fit::Four;
+use ndfmap_core::fit::{Four, LobeKind};
 use ndfmap_core::grid::Grid;
 use ndfmap_core::lookup::{Lookup, PixelFootprint, Texels};
 use ndfmap_core::ndf::{Filtered, Lit, Method};
@@ -38,7 +38,7 @@ impl Baked {
             }
             None => Vec::new(),
         };
-        let fitted = method.fit().is_some();
+        let fitted = method.fit().is_some_and(|fit| fit.kind != LobeKind::Peaks);
         let (pyramid, _) = if fitted { bake.to_pyramid_with(&carried) } else { bake.to_pyramid() };
         let finish = if fitted { &[][..] } else { &carried };
         Self {

@@ -1,0 +1,182 @@
+//! Models: what comes out of sound files, and that damaged ones are refused.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
+
+use std::path::Path;
+
+use glam::{DVec3, Vec2, Vec3};
+use ndfmap_core::scene::{Scene, Staging};
+use ndfmap_maps::MapError;
+use ndfmap_maps::model::{ModelOptions, TABLE, model_of_bytes, read_model};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+fn options() -> ModelOptions {
+    ModelOptions { staging: Staging::default() }
+}
+
+fn read(name: &str, bytes: &[u8]) -> Result<(Scene, Vec<String>), MapError> {
+    model_of_bytes(Path::new(name), bytes, &options())
+}
+
+/// A square of two triangles that faces +z, its map upright on it.
+const OBJ: &str =
+    "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+
+const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty double y\nproperty float z\n\
+    property float s\nproperty float t\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+    -1 -1 0 0 0\n1 -1 0 1 0\n1 1 0 1 1\n-1 1 0 0 1\n4 0 1 2 3\n";
+
+/// The same square as glTF: positions, coordinates (v down), indices, a two by one normal map and a base colour.
+fn gltf() -> Vec<u8> {
+    let floats: [f32; 20] =
+        [-1., -1., 0., 1., -1., 0., 1., 1., 0., -1., 1., 0., 0., 1., 1., 1., 1., 0., 0., 0.];
+    let mut buffer: Vec<u8> = floats.iter().flat_map(|f| f.to_le_bytes()).collect();
+    buffer.extend([0_u16, 1, 2, 0, 2, 3].iter().flat_map(|i| i.to_le_bytes()));
+    let png = |pixels: &[u8]| {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 2, 1);
+        encoder.set_color(png::ColorType::Rgb);
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_image_data(pixels).unwrap();
+        writer.finish().unwrap();
+        bytes
+    };
+    let normals = png(&[128, 128, 255, 218, 128, 218]);
+    let colours = png(&[255, 0, 0, 0, 0, 255]);
+    let (at_normals, at_colours) = (buffer.len(), buffer.len() + normals.len());
+    buffer.extend(&normals);
+    buffer.extend(&colours);
+    let data = base64::Engine::encode(&base64::engine::general_purpose::STANDARD, &buffer);
+    serde_json::json!({
+        "asset": { "version": "2.0" },
+        "scene": 0,
+        "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "mesh": 0, "translation": [0.0, 0.0, 5.0] }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "TEXCOORD_0": 1 }, "indices": 2, "material": 0 }] }],
+        "materials": [{
+            "normalTexture": { "index": 0, "scale": 0.5 },
+            "pbrMetallicRoughness": { "baseColorTexture": { "index": 1 }, "metallicFactor": 0.25, "roughnessFactor": 0.6 },
+        }],
+        "textures": [{ "source": 0 }, { "source": 1 }],
+        "images": [{ "bufferView": 2, "mimeType": "image/png" }, { "bufferView": 3, "mimeType": "image/png" }],
+        "buffers": [{ "byteLength": buffer.len(), "uri": format!("data:application/octet-stream;base64,{data}") }],
+        "bufferViews": [
+            { "buffer": 0, "byteLength": 80 },
+            { "buffer": 0, "byteOffset": 80, "byteLength": 12 },
+            { "buffer": 0, "byteOffset": at_normals, "byteLength": normals.len() },
+            { "buffer": 0, "byteOffset": at_colours, "byteLength": colours.len() },
+        ],
+        "accessors": [
+            { "bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [-1, -1, 0], "max": [1, 1, 0] },
+            { "bufferView": 0, "byteOffset": 48, "componentType": 5126, "count": 4, "type": "VEC2" },
+            { "bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR" },
+        ],
+    })
+    .to_string()
+    .into_bytes()
+}
+
+#[test]
+fn one_square_comes_out_of_every_format() {
+    for (name, bytes) in [("a.obj", OBJ.as_bytes()), ("a.ply", PLY.as_bytes()), ("a.gltf", &gltf())] {
+        let (scene, warnings) = read(name, bytes).unwrap();
+        assert_eq!(warnings, [] as [&str; 0], "{name}");
+        let mesh = &scene.objects[0].mesh;
+        assert_eq!((mesh.vertices.len(), mesh.triangles.len()), (4, 2), "{name}");
+        for v in &mesh.vertices {
+            // x to the right, y up, v down: the frame is that of the world.
+            assert!((v.normal - Vec3::Z).length() < 1e-6, "{name}");
+            assert!(
+                (v.tangent.truncate() - Vec3::X).length() < 1e-6 && v.tangent.w == 1.0,
+                "{name} {}",
+                v.tangent
+            );
+            let expected = Vec2::new(v.position.x + 1.0, 1.0 - v.position.y) / 2.0;
+            assert!((v.uv - expected).length() < 1e-6, "{name}");
+        }
+        let middle = DVec3::new(0.0, 0.0, if name == "a.gltf" { 5.0 } else { 0.0 });
+        assert!((scene.camera.target - middle).length() < 1e-6, "{name}");
+    }
+}
+
+#[test]
+fn gltf_materials_are_read() {
+    let (scene, _) = read("a.gltf", &gltf()).unwrap();
+    let material = &scene.materials[scene.objects[0].material];
+    let mut row = ndfmap_core::surface::SurfaceRow::flat(2);
+    material.surface.read_row(0, &mut row);
+    // 218 is 0.71: a normal at 45 degrees, whose x is then halved by the texture's scale. 8 bits: 1/255.
+    let expected = Vec3::new(0.5, 0.0, 1.0).normalize();
+    assert!((row.normal(0) - Vec3::Z).length() < 0.01 && (row.normal(1) - expected).length() < 0.01);
+    let map = material.finish_map.as_ref().unwrap();
+    // glTF 2.0, appendix B: alpha = roughness²; slopes of variance alpha²/2.
+    let gloss = 0.6_f32.powi(4) / 2.0;
+    let close = |a: [f32; 4], b: [f32; 4]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5);
+    assert!(close(map.diffuse_gloss.row(0)[0], [0.75, 0.0, 0.0, gloss]));
+    assert!(close(map.diffuse_gloss.row(0)[1], [0.0, 0.0, 0.75, gloss]));
+    assert!(close(map.specular.as_ref().unwrap().row(0)[0], [0.03 + 0.25, 0.03, 0.03, 1.0]));
+}
+
+#[test]
+fn what_a_mesh_lacks_is_made() {
+    let ball = "v 0 0 1\nv 1 0 0\nv 0 1 0\nv -1 0 0\nv 0 -1 0\nv 0 0 -1\n\
+        f 1 2 3\nf 1 3 4\nf 1 4 5\nf 1 5 2\nf 6 3 2\nf 6 4 3\nf 6 5 4\nf 6 2 5\n";
+    let (scene, warnings) = read("ball.obj", ball.as_bytes()).unwrap();
+    assert!(warnings[0].contains("no map coordinates"), "{warnings:?}");
+    for v in &scene.objects[0].mesh.vertices {
+        assert!((v.normal - v.position).length() < 1e-5, "{} {}", v.normal, v.position);
+        assert!(v.tangent.truncate().dot(v.normal).abs() < 1e-5);
+    }
+}
+
+#[test]
+fn errors_name_the_file_and_what_is_wrong() {
+    let mut far = PLY.replace("element vertex 4", "element vertex 4000000000");
+    let cases: [(&str, Vec<u8>, &str); 8] = [
+        ("a.obj", Vec::new(), "no triangles"),
+        ("a.obj", b"v 0 0 0\nf 1 2 3\n".to_vec(), "a.obj"),
+        ("a.obj", b"v 0 0 0\nv nan 0 0\nv 1 0 0\nf 1 2 3\n".to_vec(), "no places"),
+        ("a.ply", far.split_off(0).into_bytes(), "more elements than the file can hold"),
+        ("a.ply", PLY.replace("4 0 1 2 3", "4 0 1 2 9").into_bytes(), "vertex that is not there"),
+        ("a.glb", b"glTF".to_vec(), "a.glb"),
+        (
+            "a.gltf",
+            String::from_utf8(gltf()).unwrap().replace("\"count\":4", "\"count\":400000000").into_bytes(),
+            "more vertices than",
+        ),
+        ("a.stl", Vec::new(), "is no model"),
+    ];
+    for (name, bytes, reason) in cases {
+        let error = read(name, &bytes).err().unwrap().to_string();
+        assert!(error.starts_with(name) && error.contains(reason), "{error}");
+    }
+    let error = read_model(Path::new("no-such.glb"), &options()).err().unwrap().to_string();
+    assert!(error.starts_with("no-such.glb"), "{error}");
+    let named = String::from_utf8(gltf())
+        .unwrap()
+        .replace("data:application/octet-stream;base64,", "gone%20away.bin?");
+    assert!(read("a.gltf", named.as_bytes()).err().unwrap().to_string().contains("gone away.bin"));
+}
+
+#[test]
+fn damaged_models_are_errors_or_models() {
+    let mut random = Pcg64Mcg::seed_from_u64(1);
+    let sound = [("a.obj", OBJ.as_bytes().to_vec()), ("a.ply", PLY.as_bytes().to_vec()), ("a.gltf", gltf())];
+    assert!(TABLE.len() == sound.len());
+    let mut refused = 0;
+    for (name, bytes) in &sound {
+        for end in (0..bytes.len()).step_by(bytes.len() / 100 + 1) {
+            refused += usize::from(read(name, &bytes[..end]).is_err());
+        }
+        for _ in 0..400 {
+            let mut copy = bytes.clone();
+            for _ in 0..random.random_range(1..4) {
+                let at = random.random_range(0..copy.len());
+                copy[at] ^= 1 << random.random_range(0..8);
+            }
+            refused += usize::from(read(name, &copy).is_err());
+        }
+    }
+    assert!(refused > 100, "{refused}");
+}
