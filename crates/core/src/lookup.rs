@@ -73,6 +73,33 @@ pub struct Tap {
     pub lod: f64,
 }
 
+/// The two texels beside a place on one axis, and their shares.
+#[inline]
+fn pair(t: f64, n: usize, wrap: Wrap) -> [(usize, f64); 2] {
+    // What is not finite, or so far away that floats have no texels there, is as good as anywhere.
+    let t = if t.abs() < 1e15 { t } else { 0.0 };
+    let t = match wrap {
+        // The part after the point, by way of an integer, which is faster than a call of `floor`. Rounding can make it 1, which
+        // is then the first texel again.
+        Wrap::Repeat => {
+            let part = t - (t as i64) as f64;
+            if part < 0.0 { part + 1.0 } else { part }
+        }
+        Wrap::Clamp => t.clamp(0.0, 1.0),
+    };
+    let at = t * n as f64 + 0.5;
+    // One more than the first texel, from 0 to n: what lies before it is the last one, or itself.
+    let next = at as usize;
+    let part = at - next as f64;
+    let (before, after) = match wrap {
+        Wrap::Repeat => (n - 1, 0),
+        Wrap::Clamp => (0, n - 1),
+    };
+    let first = if next == 0 { before } else { (next - 1).min(n - 1) };
+    let second = if next < n { next } else { after };
+    [(first, 1.0 - part), (second, part)]
+}
+
 /// A pyramid that can be looked up.
 pub trait Texels {
     /// Sizes of the levels, finest first.
@@ -88,25 +115,17 @@ pub trait Texels {
     fn add(&self, place: Neighbour, sums: &mut [f32]);
 
     /// The four texels around `uv` on one level, and what a bilinear filter weighs them.
+    #[inline]
     fn around(&self, level: usize, uv: DVec2) -> [Neighbour; 4] {
         let (size, wraps) = (self.sizes()[level], self.wraps());
-        let axis = |t: f64, n: usize, wrap: Wrap| {
-            let t = if t.is_finite() { t } else { 0.0 };
-            let at = match wrap {
-                Wrap::Repeat => t.rem_euclid(1.0),
-                Wrap::Clamp => t.clamp(0.0, 1.0),
-            } * n as f64
-                - 0.5;
-            let floor = at.floor();
-            let index = |d: isize| wrap.index(floor as isize + d, n);
-            [(index(0), 1.0 - (at - floor)), (index(1), at - floor)]
-        };
-        let columns = axis(uv.x, size.width, wraps.x);
-        let rows = axis(uv.y, size.height, wraps.y);
-        [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(j, i)| {
-            let ((y, wy), (x, wx)) = (rows[j], columns[i]);
-            Neighbour { level, x, y, weight: wx * wy }
-        })
+        let [(left, w_left), (right, w_right)] = pair(uv.x, size.width, wraps.x);
+        let [(above, w_above), (below, w_below)] = pair(uv.y, size.height, wraps.y);
+        [
+            Neighbour { level, x: left, y: above, weight: w_left * w_above },
+            Neighbour { level, x: right, y: above, weight: w_right * w_above },
+            Neighbour { level, x: left, y: below, weight: w_left * w_below },
+            Neighbour { level, x: right, y: below, weight: w_right * w_below },
+        ]
     }
 
     /// The finer of the two levels at `lod`, and the share of the coarser; beyond the ends is clamped.
@@ -134,6 +153,7 @@ pub trait Texels {
     }
 
     /// Adds `share` of a bilinear look-up on one level.
+    #[inline]
     fn bilinear(&self, level: usize, uv: DVec2, share: f64, sums: &mut [f32]) {
         for n in self.around(level, uv) {
             if n.weight > 0.0 {
@@ -143,6 +163,7 @@ pub trait Texels {
     }
 
     /// Adds `share` of a trilinear look-up.
+    #[inline]
     fn trilinear(&self, tap: Tap, share: f64, sums: &mut [f32]) {
         let (level, t) = self.levels_of(tap.lod);
         self.bilinear(level, tap.uv, share * (1.0 - t), sums);
@@ -165,16 +186,19 @@ pub trait Texels {
         let (dx, dy) = (pixel.duv_dx * texels, pixel.duv_dy * texels);
         // Eigenvalues of J Jᵀ, whose ellipse is the image of the pixel's unit circle.
         let (a, b, c) = (dx.x * dx.x + dy.x * dy.x, dx.x * dx.y + dy.x * dy.y, dx.y * dx.y + dy.y * dy.y);
-        let (mean, spread) = ((a + c) / 2.0, ((a - c) / 2.0).hypot(b));
+        let half = (a - c) / 2.0;
+        let (mean, spread) = ((a + c) / 2.0, (half * half + b * b).sqrt());
         let (major, minor) = ((mean + spread).sqrt(), (mean - spread).max(0.0).sqrt());
-        // The angle's own formula has no branch for a circle or an axis-aligned ellipse.
-        let angle = 0.5 * (2.0 * b).atan2(a - c);
+        // The longer axis has twice the angle whose cosine and sine are these: halved by square roots, the larger first.
+        let (cos2, sin2) = if spread > 0.0 { (half / spread, b / spread) } else { (1.0, 0.0) };
+        let larger = ((1.0 + cos2.abs()) / 2.0).sqrt();
+        let smaller = sin2 / (2.0 * larger);
+        let axis = if cos2 >= 0.0 { DVec2::new(larger, smaller) } else { DVec2::new(smaller, larger) };
         let parts = filtering.parts.max(1) as f64;
         let wanted = (major / minor.max(1.0)).ceil();
         let long = if wanted.is_finite() { wanted.clamp(1.0, filtering.max_taps.max(1) as f64) } else { 1.0 };
         let long = long * parts;
         let lod = (major / long).max(minor / parts).max(1.0).log2() + filtering.lod_bias;
-        let axis = DVec2::from_angle(angle);
         let (along, across) = (axis * major / texels, axis.perp() * minor / texels);
         let uv = pixel.uv;
         let place = |i: usize, of: f64| (i as f64 + 0.5) / of - 0.5;
@@ -283,10 +307,14 @@ impl Texels for Lookup {
         self.channels
     }
 
+    #[inline]
     fn add(&self, place: Neighbour, sums: &mut [f32]) {
         let weight = place.weight as f32;
-        for (sum, c) in sums.iter_mut().zip(self.texel(place.level, place.x, place.y)) {
-            *sum += weight * c;
+        let texel = self.texel(place.level, place.x, place.y);
+        for (sum, c) in sums.as_chunks_mut::<4>().0.iter_mut().zip(texel.as_chunks::<4>().0) {
+            for k in 0..4 {
+                sum[k] += weight * c[k];
+            }
         }
     }
 }

@@ -28,7 +28,7 @@ pub use mixture::{Cosine, Lobes, Shaded};
 pub use naive::Naive;
 pub use ndm::{Kernel, Ndm, Normalisation};
 pub use phong::{Phong, PhongPeaks};
-pub use reflect::{Filtered, Lit};
+pub use reflect::{Filtered, Lit, Prepared};
 pub use sh::{Coefficients, Sh};
 pub use slopes::{SlopeGaussian, SlopeMoments, Slopes};
 pub use toksvig::{Lobe, Toksvig};
@@ -38,10 +38,11 @@ use std::fmt::Debug;
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
-use crate::brdf::Brdf;
+use crate::brdf::{Brdf, Lambert};
 use crate::fit::{Fit, Four};
 use crate::reflection::Reflection;
 use crate::surface::SurfaceRow;
+use crate::units::SlopeVariance;
 
 /// One fine texel, as a representation sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,6 +91,21 @@ pub trait Representation: Debug + Send + Sync {
 
     /// The effective lobe `w ↦ ∫ f(w·n) gamma(n) dn` under this distribution.
     fn effective<'a>(&'a self, lobes: &Self::Lobes, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a>;
+
+    /// What [`Self::effective_with`] wants to know of a lobe, the same for all texels.
+    fn table(&self, _brdf: &dyn Brdf) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// [`Self::effective`] with the lobe's [`Self::table`] at hand.
+    fn effective_with<'a>(
+        &'a self,
+        lobes: &Self::Lobes,
+        brdf: &'a dyn Brdf,
+        _table: &'a [f64],
+    ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+        self.effective(lobes, brdf)
+    }
 
     /// The mean normal, whose length says how far the normals stray.
     fn mean(&self, lobes: &Self::Lobes) -> DVec3;
@@ -264,6 +280,9 @@ pub trait Method: Debug + Send + Sync {
     /// An evaluator for one BRDF at fixed directions.
     fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a>;
 
+    /// What shading wants to know of a material, the same for all its texels.
+    fn prepare(&self, reflection: &Reflection, gloss: SlopeVariance) -> Prepared;
+
     /// The light that a texel with these filtered channels sends to the eye; see [`Filtered`].
     fn reflect(&self, texel: &Filtered<'_>, reflection: &Reflection, lights: &[Lit]) -> DVec3;
 
@@ -321,6 +340,12 @@ impl<R: Representation> Method for R {
 
     fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
         Representation::evaluator(self, brdf, directions)
+    }
+
+    fn prepare(&self, reflection: &Reflection, gloss: SlopeVariance) -> Prepared {
+        let lobe = reflection.lobe.widen(gloss);
+        let tables = [self.table(&*lobe), self.table(&Lambert::SHARP)];
+        Prepared { gloss, lobe, tables }
     }
 
     fn reflect(&self, texel: &Filtered<'_>, reflection: &Reflection, lights: &[Lit]) -> DVec3 {

@@ -22,6 +22,16 @@ pub struct Lit {
     pub irradiance: DVec3,
 }
 
+/// What shading wants to know of a material, made once by [`super::Method::prepare`].
+pub struct Prepared {
+    /// The gloss it is made for.
+    pub(super) gloss: SlopeVariance,
+    /// The lobe widened by it.
+    pub(super) lobe: Box<dyn Brdf>,
+    /// The method's tables for that lobe and for the diffuse one.
+    pub(super) tables: [Vec<f64>; 2],
+}
+
 /// A filtered texel.
 #[derive(Clone, Copy)]
 pub struct Filtered<'a> {
@@ -29,6 +39,8 @@ pub struct Filtered<'a> {
     pub channels: &'a [f32],
     /// What it is made of: in the layer of a lobe, or (`None`) over all.
     pub finish: &'a dyn Fn(Option<usize>) -> Finish,
+    /// What was prepared for the material.
+    pub prepared: &'a Prepared,
     /// Take factors at the lobes' means, as the papers print it.
     pub at_means: bool,
 }
@@ -43,9 +55,14 @@ pub(super) fn reflect<R: Representation + ?Sized>(
     let decoded = representation.decode(&representation.unpack(texel.channels));
     let Some((cosine, lobes)) = representation.isotropic(&decoded) else {
         let finish = (texel.finish)(None);
-        let widened = (finish.gloss > SlopeVariance::ZERO).then(|| reflection.lobe.widen(finish.gloss));
-        let lobe = representation.effective(&decoded, widened.as_deref().unwrap_or(&*reflection.lobe));
-        let diffuse = representation.effective(&decoded, &Lambert::SHARP);
+        let Prepared { gloss, lobe, tables: [table, diffuse_table] } = texel.prepared;
+        // Where a gloss map says something else than what was prepared for, the lobe is made anew.
+        let own = (finish.gloss != *gloss).then(|| reflection.lobe.widen(finish.gloss));
+        let lobe = match &own {
+            Some(own) => representation.effective(&decoded, &**own),
+            None => representation.effective_with(&decoded, &**lobe, table),
+        };
+        let diffuse = representation.effective_with(&decoded, &Lambert::SHARP, diffuse_table);
         let width = reflection.width(finish.gloss);
         let mean = representation.mean(&decoded);
         let length = mean.length().clamp(1e-3, 1.0);

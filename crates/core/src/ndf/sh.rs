@@ -141,6 +141,20 @@ impl Representation for Sh {
         DVec3::new(x.into(), y.into(), z.into()) * (4.0 * PI / 3.0).sqrt()
     }
 
+    fn table(&self, brdf: &dyn Brdf) -> Vec<f64> {
+        self.zonal(brdf)
+    }
+
+    fn effective_with<'a>(
+        &'a self,
+        lobes: &Coefficients,
+        _brdf: &'a dyn Brdf,
+        table: &'a [f64],
+    ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+        let lobes = *lobes;
+        Box::new(move |w| clamped_dot(&self.weights(table, w), &lobes.gamma))
+    }
+
     fn effective<'a>(&'a self, lobes: &Coefficients, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         let (rho, lobes) = (self.zonal(brdf), *lobes);
         Box::new(move |w| clamped_dot(&self.weights(&rho, w), &lobes.gamma))

@@ -5,7 +5,7 @@ use ndfmap_core::bake::Bake;
 use ndfmap_core::fit::{Four, LobeKind};
 use ndfmap_core::grid::Grid;
 use ndfmap_core::lookup::{Lookup, PixelFootprint, Texels};
-use ndfmap_core::ndf::{Filtered, Lit, Method};
+use ndfmap_core::ndf::{Filtered, Lit, Method, Prepared};
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::reflection::Finish;
 use ndfmap_core::scene::Material;
@@ -20,6 +20,13 @@ pub(super) struct Baked {
     layers: usize,
     /// Colours and gloss, for methods whose lobes carry none.
     finish: Vec<Lookup>,
+}
+
+/// A material as it is shaded with one method.
+pub(super) struct Shading<'a> {
+    pub(super) material: &'a Material,
+    pub(super) method: &'a dyn Method,
+    pub(super) prepared: &'a Prepared,
 }
 
 impl Baked {
@@ -51,7 +58,7 @@ impl Baked {
     /// Light that the pixel sends to the eye.
     pub(super) fn shade(
         &self,
-        (material, method): (&Material, &dyn Method),
+        shading: &Shading<'_>,
         pixel: &PixelFootprint,
         lookups: Lookups,
         (channels, lights): (&mut Vec<f32>, &[Lit]),
@@ -61,27 +68,28 @@ impl Baked {
         for (lookup, colour) in self.finish.iter().zip(&mut colours) {
             lookup.filtered(pixel, filtering, colour);
         }
-        if lookups.neighbours || !method.filterable() {
+        if lookups.neighbours || !shading.method.filterable() {
             let (count, taps) = self.map.taps(pixel, filtering);
             let mut sum = DVec3::ZERO;
             for n in taps.flat_map(|tap| self.map.neighbours(tap)) {
                 let texel = self.map.texel(n.level, n.x, n.y);
-                sum += n.weight * self.reflect((material, method), (texel, &colours), lookups, lights);
+                sum += n.weight * self.reflect(shading, (texel, &colours), lookups, lights);
             }
             return sum / count as f64;
         }
         channels.resize(self.map.channels(), 0.0);
         self.map.filtered(pixel, filtering, channels);
-        self.reflect((material, method), (channels, &colours), lookups, lights)
+        self.reflect(shading, (channels, &colours), lookups, lights)
     }
 
     fn reflect(
         &self,
-        (material, method): (&Material, &dyn Method),
+        shading: &Shading<'_>,
         (channels, colours): (&[f32], &[[f32; 4]; 2]),
         lookups: Lookups,
         lights: &[Lit],
     ) -> DVec3 {
+        let material = shading.material;
         let finish = |layer: Option<usize>| match (&material.finish_map, layer) {
             (None, _) => material.finish,
             (Some(_), Some(layer)) if self.finish.is_empty() => {
@@ -95,9 +103,13 @@ impl Baked {
             }
             (Some(_), _) => finish_of(material, colours[0], (self.finish.len() > 1).then_some(colours[1])),
         };
-        let texel =
-            Filtered { channels: &channels[..4 * self.layers], finish: &finish, at_means: lookups.at_means };
-        method.reflect(&texel, &material.reflection, lights)
+        let texel = Filtered {
+            channels: &channels[..4 * self.layers],
+            finish: &finish,
+            prepared: shading.prepared,
+            at_means: lookups.at_means,
+        };
+        shading.method.reflect(&texel, &material.reflection, lights)
     }
 }
 

@@ -9,12 +9,12 @@ use glam::{DVec2, DVec3};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::lookup::{Filtering, PixelFootprint};
 use ndfmap_core::metrics::Picture;
-use ndfmap_core::ndf::{Lit, Method};
+use ndfmap_core::ndf::{Lit, Method, Prepared};
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{Camera, Material, Rays, Scene};
 use rayon::prelude::*;
 
-use self::baked::Baked;
+use self::baked::{Baked, Shading};
 use crate::geometry::{Geometry, Hit, Place};
 use crate::ways;
 
@@ -70,6 +70,14 @@ pub struct Filtered<'a> {
     pub maps: &'a BakedMaps<'a>,
 }
 
+/// What is the same for all pixels.
+#[derive(Clone, Copy)]
+struct How<'a> {
+    lookups: Lookups,
+    /// For each material.
+    prepared: &'a [Prepared],
+}
+
 /// Room for a pixel's channels.
 struct Scratch {
     channels: Vec<f32>,
@@ -81,18 +89,21 @@ impl Filtered<'_> {
     #[must_use]
     pub fn render(&self, camera: &Camera, size: Size, lookups: Lookups) -> Picture {
         let rays = camera.rays(size);
+        let prepare = |m: &Material| self.maps.method.prepare(&m.reflection, m.finish.gloss);
+        let prepared: Vec<Prepared> = self.scene.materials.iter().map(prepare).collect();
         let centre = |i: usize| DVec2::new((i % size.width) as f64 + 0.5, (i / size.width) as f64 + 0.5);
         let hits: Vec<Option<(Hit, Place)>> =
             (0..size.area()).into_par_iter().map(|i| self.look(&rays, centre(i))).collect();
+        let how = How { lookups, prepared: &prepared };
         let rows = (0..size.height).into_par_iter().map_init(
             || Scratch { channels: Vec::new(), lights: Vec::new() },
             |scratch, y| {
                 let mut row = Vec::with_capacity(size.width);
                 for i in y * size.width..(y + 1) * size.width {
                     let colour = if outline(&hits, size, i) {
-                        self.parts(&rays, centre(i), lookups, scratch)
+                        self.parts(&rays, centre(i), how, scratch)
                     } else {
-                        self.shade(&rays, hits[i].as_ref(), (centre(i), 1.0), (lookups, scratch))
+                        self.shade(&rays, hits[i].as_ref(), (centre(i), 1.0), (how, scratch))
                     };
                     row.push(colour.as_vec3());
                 }
@@ -109,13 +120,13 @@ impl Filtered<'_> {
     }
 
     /// A pixel as the mean of its parts.
-    fn parts(&self, rays: &Rays, centre: DVec2, lookups: Lookups, scratch: &mut Scratch) -> DVec3 {
+    fn parts(&self, rays: &Rays, centre: DVec2, how: How<'_>, scratch: &mut Scratch) -> DVec3 {
         let mut sum = DVec3::ZERO;
         for i in 0..PARTS * PARTS {
             let part = DVec2::new((i % PARTS) as f64, (i / PARTS) as f64);
             let at = centre + (part + 0.5) / PARTS as f64 - 0.5;
             let hit = self.look(rays, at);
-            sum += self.shade(rays, hit.as_ref(), (at, 1.0 / PARTS as f64), (lookups, scratch));
+            sum += self.shade(rays, hit.as_ref(), (at, 1.0 / PARTS as f64), (how, scratch));
         }
         sum / (PARTS * PARTS) as f64
     }
@@ -126,7 +137,7 @@ impl Filtered<'_> {
         rays: &Rays,
         hit: Option<&(Hit, Place)>,
         (at, width): (DVec2, f64),
-        (lookups, scratch): (Lookups, &mut Scratch),
+        (how, scratch): (How<'_>, &mut Scratch),
     ) -> DVec3 {
         let Some((hit, place)) = hit else { return self.scene.background.as_dvec3() };
         let wo = place.frame.transpose() * -rays.direction(at);
@@ -138,13 +149,13 @@ impl Filtered<'_> {
         }
         let [dx, dy] = self.geometry.differentials(hit, place, rays, at);
         let pixel = PixelFootprint { uv: place.uv, duv_dx: dx * width, duv_dy: dy * width };
-        let material = (&self.scene.materials[place.material], self.maps.method);
-        self.maps.materials[place.material].shade(
-            material,
-            &pixel,
-            lookups,
-            (&mut scratch.channels, &scratch.lights),
-        )
+        let shading = Shading {
+            material: &self.scene.materials[place.material],
+            method: self.maps.method,
+            prepared: &how.prepared[place.material],
+        };
+        let Scratch { channels, lights } = scratch;
+        self.maps.materials[place.material].shade(&shading, &pixel, how.lookups, (channels, lights))
     }
 }
 
