@@ -9,7 +9,7 @@ use ndfmap_core::light::Light;
 use ndfmap_core::reflection::Model;
 use ndfmap_core::scene::{self, Camera, Scene, Staging};
 use ndfmap_core::surface::Surface;
-use ndfmap_maps::model::{ModelOptions, is_model, read_model};
+use ndfmap_maps::model::{ModelOptions, read_model};
 
 use crate::Failure;
 
@@ -50,17 +50,10 @@ impl Stage {
         let path = Path::new(&self.scene);
         let mut scene = match scene::find(&self.scene) {
             Some(row) => (row.build)(&staging),
-            None if is_model(path) => {
+            None => {
                 let (scene, warnings) = read_model(path, &ModelOptions { staging })?;
                 warnings.iter().for_each(|w| eprintln!("ndfmap: warning: {}: {w}", path.display()));
                 scene
-            }
-            None => {
-                return Err(Failure::Usage(format!(
-                    "there is no scene `{}`: neither a built-in one ({}) nor a model file (.gltf, .glb, .obj, .ply)",
-                    self.scene,
-                    scene::TABLE.iter().map(|row| row.name).collect::<Vec<_>>().join(", ")
-                )));
             }
         };
         if let Some(first) = scene.materials.first_mut()

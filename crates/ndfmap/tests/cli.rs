@@ -447,3 +447,166 @@ fn interrupted_bakes_leave_nothing() {
     assert_eq!(child.wait().unwrap().code(), Some(130));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
+
+#[test]
+fn render_writes_pictures_and_tells_scripts() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| text(&folder.path().join(name));
+    let (png, truth, sheet) = (at("a.png"), at("truth.exr"), at("sheet.png"));
+    let told = json(&[
+        "render",
+        "--scene",
+        "disk",
+        "--map-size",
+        "64",
+        "--size",
+        "48x40",
+        "-m",
+        "vmf:2,naive",
+        "-o",
+        &png,
+        "--truth",
+        "64",
+        "--truth-output",
+        &truth,
+        "--compare",
+        &sheet,
+        "--sparkle",
+        "--json",
+    ]);
+    assert_eq!(told["scene"], "disk");
+    assert_eq!((&told["method"], &told["device"]), (&Value::from("vmf:2"), &Value::from("cpu")));
+    assert_eq!((told["width"].as_u64(), told["height"].as_u64()), (Some(48), Some(40)));
+    assert!(told["seconds"].as_f64().unwrap() > 0.0);
+    assert!(["median", "min", "max"].iter().all(|k| told["frame_ms"][*k].as_f64().unwrap() > 0.0));
+    for key in ["relative_l2", "color_error", "sparkle"] {
+        let of = |value: &Value| value[key].as_f64().unwrap();
+        assert!(of(&told["error"]) >= 0.0);
+        assert!(
+            key == "sparkle" || of(&told["error"]) < of(&told["methods"]["naive"]["error"]),
+            "{key}: {told}"
+        );
+    }
+    assert_eq!(told["truth"]["rays_per_pixel"], 64);
+    assert!(told["truth"]["noise"].as_f64().unwrap() > 0.0);
+    for (file, magic) in [(&png, b"\x89PNG"), (&truth, b"\x76\x2f\x31\x01"), (&sheet, b"\x89PNG")] {
+        assert!(std::fs::read(file).unwrap().starts_with(magic), "{file}");
+    }
+    // Linear light: a picture that the program itself can read back.
+    assert_eq!(json(&["inspect", &truth, "--from", "normal", "--json"])["width"], 48);
+
+    let numbered = at("frame.png");
+    let frames = json(&[
+        "render",
+        "--scene",
+        "v-groove",
+        "--map-size",
+        "16",
+        "--size",
+        "8",
+        "--frames",
+        "3",
+        "-o",
+        &numbered,
+        "--json",
+    ]);
+    assert!(frames.get("error").is_none());
+    assert!((0..3).all(|i| folder.path().join(format!("frame-000{i}.png")).exists()));
+}
+
+#[test]
+fn render_gives_the_same_bytes_for_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut all = Vec::new();
+    for threads in ["1", "2", "7"] {
+        let (a, b) = (text(&folder.path().join("a.exr")), text(&folder.path().join("b.exr")));
+        json(&[
+            "render",
+            "--scene",
+            "creature",
+            "--map-size",
+            "32",
+            "--size",
+            "40",
+            "-m",
+            "gmm:3",
+            "-o",
+            &a,
+            "--truth",
+            "32",
+            "--truth-output",
+            &b,
+            "--threads",
+            threads,
+            "--json",
+        ]);
+        all.push((std::fs::read(a).unwrap(), std::fs::read(b).unwrap()));
+    }
+    assert!(all[0] == all[1] && all[0] == all[2]);
+}
+
+#[test]
+fn render_used_wrongly_says_what_is_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = text(&folder.path().join("broken.glb"));
+    std::fs::write(&model, b"glTF\x02\x00\x00\x00").unwrap();
+    let cases: [(&[&str], i32, &str); 12] = [
+        (&["--scene", "dsk", "-o", "a.png"], 2, "did you mean `disk`"),
+        (&["--scene", "disk"], 2, "--output"),
+        (&["--scene", "disk", "-o", "a.jpg"], 2, "pictures are written as .png or .exr"),
+        (&["--scene", "disk", "-o", "a.png", "--compare", "b.exr"], 2, "contact sheets"),
+        (&["--scene", "disk", "-o", "a.png", "-m", "toksvg"], 2, "did you mean `toksvig`"),
+        (&["--scene", "disk", "-o", "a.png", "--time", "2"], 2, "from 0 to 1"),
+        (&["--scene", "disk", "-o", "a.png", "--camera", "1,2,3"], 2, "six numbers"),
+        (&["--scene", "disk", "-o", "a.png", "--camera", "1,2,3,1,2,3"], 2, "somewhere else"),
+        (&["--scene", "disk", "-o", "a.png", "--light", "0,0,0"], 2, "must not be zero"),
+        (&["--scene", "disk", "-o", "a.png", "--filter", "cubic"], 2, "trilinear"),
+        (&["--scene", "gone.glb", "-o", "a.png"], 1, "gone.glb"),
+        (&["--scene", &model, "-o", "a.png"], 1, "broken.glb"),
+    ];
+    for (words, status, reason) in cases {
+        let all: Vec<&str> = ["render"].into_iter().chain(words.iter().copied()).collect();
+        let (code, out, err) = outcome(&all);
+        assert_eq!((code, out.as_str()), (status, ""), "{words:?}: {err}");
+        assert!(err.contains(reason), "{words:?}: {err}");
+    }
+    let nowhere = text(&folder.path().join("no/such/folder/a.png"));
+    let (code, _, err) =
+        outcome(&["render", "--scene", "v-groove", "--size", "4", "--map-size", "4", "-o", &nowhere]);
+    assert!(code == 1 && err.contains("a.png"), "{err}");
+}
+
+#[test]
+fn compare_measures_pictures_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = text(&folder.path().join("report"));
+    let told = json(&[
+        "compare",
+        "builtin:foil",
+        "--size",
+        "32",
+        "--methods",
+        "naive,vmf:2",
+        "--scene",
+        "plane",
+        "--truth",
+        "32",
+        "--picture",
+        "24",
+        "--report",
+        &report,
+        "--json",
+    ]);
+    assert_eq!(told["scene"], "plane");
+    for method in ["naive", "vmf:2"] {
+        let picture = &told["methods"][method]["picture"];
+        assert!(
+            picture["error"]["color_error"].as_f64().unwrap() > 0.0
+                && picture["frame_ms"]["median"].as_f64().is_some()
+        );
+    }
+    assert!(folder.path().join("report/scene.png").exists());
+    assert!(
+        std::fs::read_to_string(folder.path().join("report/report.html")).unwrap().contains("In a scene")
+    );
+}

@@ -5,8 +5,10 @@ use ndfmap_core::brdf::{self, ParseBrdfError};
 use ndfmap_core::grid::Size;
 use ndfmap_core::ndf::{self, Method, ParseMethodError};
 use ndfmap_core::pyramid;
+use ndfmap_core::scene;
 use ndfmap_core::surface::{SlopeFilter, Wrap, Wraps};
 use ndfmap_maps::SourceKind;
+use ndfmap_maps::model::is_model;
 use ndfmap_maps::source::{Convention, DEFAULT_HEIGHT_SCALE, SourceOptions};
 
 /// How to take the source map.
@@ -151,6 +153,16 @@ pub(super) fn brdf_spelling(text: &str) -> Result<String, String> {
         Err(ParseBrdfError::Unknown(name)) => Err(unknown(&name, brdf::TABLE.iter().map(|r| r.name))),
         Err(other) => Err(other.to_string()),
     }
+}
+
+/// Checks the name of a scene; what is neither built in nor named like a model suggests the nearest.
+pub(super) fn scene_name(text: &str) -> Result<String, String> {
+    if scene::find(text).is_some() || is_model(text.as_ref()) {
+        return Ok(text.to_owned());
+    }
+    let models: Vec<&str> = ndfmap_maps::model::TABLE.iter().flat_map(|f| f.extensions).copied().collect();
+    let nearest = unknown(text, scene::TABLE.iter().map(|r| r.name));
+    Err(format!("{nearest}, and models: .{}", models.join(", .")))
 }
 
 fn unknown(name: &str, known: impl Iterator<Item = &'static str> + Clone) -> String {

@@ -14,7 +14,7 @@ use ndfmap_trace::truth::Effort;
 
 use super::arguments::{
     BuiltinSize, Precision, SourceArguments, brdf_spelling, brdfs_help, method, method_spelling,
-    methods_help, size,
+    methods_help, scene_name, size,
 };
 use super::render::FilterArguments;
 use super::{print, print_json, say_if_replaced, warn};
@@ -50,7 +50,7 @@ pub(super) struct Compare {
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
     /// Also render the map in a scene, and measure pictures: a built-in scene, or a model file
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "NAME|FILE", value_parser = scene_name)]
     scene: Option<String>,
     /// Rays a pixel of the true picture
     #[arg(long, value_name = "RAYS", default_value_t = 256, requires = "scene",

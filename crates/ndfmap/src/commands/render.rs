@@ -19,7 +19,7 @@ use serde_json::json;
 
 use super::arguments::{
     Precision, SourceArguments, brdf_spelling, brdfs_help, method, method_spelling, methods_help, positive,
-    size,
+    scene_name, size,
 };
 use super::{print, print_json, say_if_replaced, warn};
 use crate::Failure;
@@ -32,7 +32,7 @@ use crate::staging::{CameraArgument, Stage};
 #[command(after_long_help = format!("{}\n\n{}\n\n{}", scenes_help(), methods_help(), brdfs_help()))]
 pub(super) struct Render {
     /// A built-in scene, or a model: .gltf, .glb, .obj or .ply
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "NAME|FILE", value_parser = scene_name)]
     scene: String,
     /// A normal or height map, or `builtin:NAME`, for the scene's first material
     #[arg(long)]
