@@ -120,3 +120,77 @@ fn together(reflection: &Reflection, finish: &Finish, way: &Way, (specular, diff
     let fresnel = reflection.model.fresnel(finish.specular, way.u);
     fresnel * specular.max(0.0) + reflection.model.diffuse_share(fresnel) * diffuse
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf;
+    use crate::ndf;
+    use crate::reflection::Model;
+    use glam::Vec3;
+
+    /// Normals of a Gaussian of slopes on an even lattice, some 30 degrees wide.
+    fn normals() -> Vec<Vec3> {
+        let axis = (0..41).map(|i| (f64::from(i) - 20.0) / 20.0 * 1.2);
+        let lattice = axis.clone().flat_map(|x| axis.clone().map(move |y| (x, y)));
+        // Density by repetition: a texel for each weight that exceeds its place in a fixed order.
+        let keep = |(i, (x, y)): (usize, (f64, f64))| {
+            let density = (-(x * x + y * y) / (2.0 * 0.25)).exp();
+            let place = (i as f64 * 0.618_033_988_749_895).fract();
+            (density > place).then(|| Vec3::new(-x as f32, -y as f32, 1.0).normalize())
+        };
+        lattice.enumerate().filter_map(keep).collect()
+    }
+
+    #[test]
+    fn factors_belong_to_the_normals_that_answer() {
+        // One wide lobe under a narrow BRDF: light comes from a few of its normals, not from the mean.
+        let normals = normals();
+        let finish = Finish { diffuse: DVec3::ZERO, specular: DVec3::ONE, gloss: SlopeVariance::ZERO };
+        for model in Model::ALL {
+            let reflection = Reflection { lobe: brdf::parse("blinn-phong:200").unwrap(), model };
+            for method in ["vmf:1", "slopes"] {
+                let method = ndf::parse(method).unwrap();
+                let mut channels = vec![0.0; 4 * method.layers()];
+                let row = |n: &Vec3| {
+                    let mut row = crate::surface::SurfaceRow::flat(1);
+                    row.set_normal(0, *n);
+                    row
+                };
+                let mut one = vec![0.0; channels.len()];
+                for n in &normals {
+                    method.accumulate_row(&row(n), &mut one);
+                    channels.iter_mut().zip(&one).for_each(|(sum, c)| *sum += c / normals.len() as f32);
+                }
+                let prepared = method.prepare(&reflection, SlopeVariance::ZERO);
+                let (mut faithful, mut ours) = (0.0, 0.0);
+                for k in 0..60 {
+                    let (sin, cos) = (0.1 * f64::from(k)).sin_cos();
+                    let wi = DVec3::new(0.7 * cos, 0.7 * sin, 0.6).normalize();
+                    let wo = DVec3::new(0.5 * sin, -0.3, 0.8).normalize();
+                    let way = Way::new(wi, wo).unwrap();
+                    // The factor that the facets have together, each as bright as its lobe: mean f c over mean f.
+                    let lobe = |n: &Vec3| reflection.lobe.evaluate(n.as_dvec3().dot(way.wh));
+                    let bright = |n: &Vec3| lobe(n) * reflection.factor(n.as_dvec3(), &way, finish.gloss);
+                    let exact =
+                        normals.iter().map(bright).sum::<f64>() / normals.iter().map(lobe).sum::<f64>();
+                    let by = |at_means| {
+                        let texel = Filtered {
+                            channels: &channels,
+                            finish: &|_| finish,
+                            prepared: &prepared,
+                            at_means,
+                        };
+                        let lit = Lit { way, irradiance: DVec3::ONE };
+                        method.reflect(&texel, &reflection, &[lit]).x
+                    };
+                    // The method's own lobe is the same in both; the mean of these normals is the vertical.
+                    let at_mean = reflection.factor(DVec3::Z, &way, finish.gloss);
+                    faithful += (at_mean - exact).powi(2);
+                    ours += (at_mean * by(false) / by(true) - exact).powi(2);
+                }
+                assert!(ours < 0.1 * faithful, "{model:?} {}: {ours} {faithful}", method.spelling());
+            }
+        }
+    }
+}
