@@ -1,6 +1,6 @@
 //! Models: meshes and materials from glTF, OBJ and PLY files, as scenes.
 //!
-//! A parser only fills in [`RawMesh`]; what a file leaves out is made here, the same way for all: normals (area-weighted),
+//! A parser only fills in a raw mesh; what a file leaves out is made here, the same way for all: normals (area-weighted),
 //! map coordinates (`unwrap.rs`), tangents (MikkTSpace), and a camera and two lights that suit the model's size.
 
 mod gltf;

@@ -10,13 +10,8 @@ use crate::MapError;
 pub(super) const FORMAT: ModelFormat = ModelFormat { name: "OBJ", extensions: &["obj"], read };
 
 fn read(path: &Path, bytes: &[u8], warnings: &mut Vec<String>) -> Result<Parts, MapError> {
-    let options = tobj::LoadOptions {
-        single_index: true,
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        ..Default::default()
-    };
+    let options =
+        tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
     let no_materials = |_: &Path| Ok((Vec::new(), Default::default()));
     let mut reader = bytes;
     let (models, _) =

@@ -45,7 +45,7 @@ enum Command {
     Bake(bake::Bake),
     Inspect(inspect::Inspect),
     Compare(compare::Compare),
-    Render(render::Render),
+    Render(Box<render::Render>),
 }
 
 impl Program {
