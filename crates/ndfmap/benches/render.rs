@@ -72,7 +72,7 @@ fn costs(name: &str, time: f64, side: usize, runs: usize) -> Result<(), Box<dyn 
     for spelling in METHODS {
         let method = ndf::parse(spelling)?;
         let maps = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
-        let filtered = Filtered { scene: &scene, geometry: &geometry, maps: &maps };
+        let filtered = Filtered { scene: &scene, geometry: &geometry, maps: &maps, progress: &|_| () };
         for (filter, filtering) in FILTERS {
             let lookups = Lookups { filtering: *filtering, ..Lookups::TRILINEAR };
             let render = || filtered.render(&scene.camera, size, lookups);
@@ -97,7 +97,7 @@ fn scaling(side: usize, runs: usize) -> Result<(), Box<dyn std::error::Error>> {
         let scene = scene("plane", 0.0, map)?;
         let geometry = Geometry::new(&scene);
         let maps = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
-        let filtered = Filtered { scene: &scene, geometry: &geometry, maps: &maps };
+        let filtered = Filtered { scene: &scene, geometry: &geometry, maps: &maps, progress: &|_| () };
         for side in [side / 2, side, 2 * side] {
             let lookups = Lookups { filtering: Filtering::fine(16), ..Lookups::TRILINEAR };
             let own = median(runs, || drop(filtered.render(&scene.camera, square(side), lookups)));

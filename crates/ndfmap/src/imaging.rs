@@ -114,7 +114,8 @@ fn frame(shot: &Shot<'_>, scene: &Scene, time: f64, baked: &[BakedMaps<'_>]) -> 
         true_change(&truth.drift(&scene.camera, size, effort.rays, &|f| progress.set(f)), exposure)
     });
     let take = |maps: &BakedMaps<'_>| {
-        let filtered = Filtered { scene, geometry: &geometry, maps };
+        let progress = Progress::new("filtered");
+        let filtered = Filtered { scene, geometry: &geometry, maps, progress: &|f| progress.set(f) };
         let start = Instant::now();
         let picture = filtered.render(&scene.camera, size, shot.lookups);
         let milliseconds = start.elapsed().as_secs_f64() * 1e3;

@@ -6,7 +6,13 @@ use ndfmap_core::metrics::Picture;
 use ndfmap_core::scene::Camera;
 
 /// Steps of the drift, each a sixteenth of a pixel to the right and down.
-const STEPS: usize = 16;
+pub(crate) const STEPS: usize = 16;
+
+/// Cells of a pixel.
+pub(crate) const CELLS: usize = STEPS * STEPS;
+
+/// Rows of pixels whose cells are worked out together: cells are many, and those between two bands are worked out twice.
+pub(crate) const BAND: usize = 8;
 
 /// Frames of a drift, from the camera where it is to a whole pixel on.
 pub const DRIFT_FRAMES: usize = STEPS + 1;
@@ -50,7 +56,7 @@ pub(crate) fn frames(cells: &[DVec3], size: Size) -> Vec<Picture> {
             let (x, y) = (x * STEPS + step, y * STEPS + step);
             let (right, below) = (x + STEPS, y + STEPS);
             let sum = at(right, below) - at(x, below) - at(right, y) + at(x, y);
-            (sum / (STEPS * STEPS) as f64).as_vec3()
+            (sum / CELLS as f64).as_vec3()
         })
     };
     (0..DRIFT_FRAMES).map(frame).collect()

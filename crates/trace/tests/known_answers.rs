@@ -63,7 +63,11 @@ fn filtered(scene: &Scene, method: &str, size: Size, lookups: Lookups) -> Pictur
     let geometry = Geometry::new(scene);
     let method = ndf::parse(method).unwrap();
     let maps = BakedMaps::new(&scene.materials, &*method, Precision::Single, &|_| ());
-    Filtered { scene, geometry: &geometry, maps: &maps }.render(&scene.camera, size, lookups)
+    Filtered { scene, geometry: &geometry, maps: &maps, progress: &|_| () }.render(
+        &scene.camera,
+        size,
+        lookups,
+    )
 }
 
 /// Mean over all texels of what they reflect, for one way: what a whole map far away looks like.
@@ -303,11 +307,8 @@ fn every_method_shows_every_scene() {
         for method in ndf::TABLE {
             let method = ndf::parse(method.samples[0]).unwrap();
             let maps = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
-            let picture = Filtered { scene: &scene, geometry: &geometry, maps: &maps }.render(
-                &scene.camera,
-                size,
-                lookups,
-            );
+            let picture = Filtered { scene: &scene, geometry: &geometry, maps: &maps, progress: &|_| () }
+                .render(&scene.camera, size, lookups);
             let sound = picture.texels().iter().all(|p| p.is_finite() && p.min_element() >= 0.0);
             let bright = picture.texels().iter().any(|p| p.max_element() > 0.03);
             assert!(sound && bright, "{} by {}", row.name, method.spelling());

@@ -74,7 +74,7 @@ pub(super) struct Render {
     /// A light in place of the scene's: the direction to it X,Y,Z, or `point:X,Y,Z`, and perhaps :R,G,B. May be repeated
     #[arg(long, value_name = "LIGHT", value_parser = light, allow_hyphen_values = true)]
     light: Vec<Light>,
-    /// A reflectance lobe in place of the materials' own
+    /// A reflectance lobe in place of the materials' own; where a material has a gloss map, that still widens it
     #[arg(long, value_parser = brdf_spelling)]
     brdf: Option<String>,
     /// What goes with the lobe: Tan et al.'s, Han et al.'s or Smith's factor

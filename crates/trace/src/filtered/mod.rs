@@ -5,7 +5,9 @@
 
 mod baked;
 
-use glam::{DVec2, DVec3};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use glam::{DVec2, DVec3, Vec3};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::lookup::{Filtering, PixelFootprint};
 use ndfmap_core::metrics::Picture;
@@ -68,7 +70,12 @@ pub struct Filtered<'a> {
     pub geometry: &'a Geometry,
     /// Its maps.
     pub maps: &'a BakedMaps<'a>,
+    /// Called now and then with the fraction done.
+    pub progress: &'a (dyn Fn(f64) + Sync),
 }
+
+/// Rows that are worked out together.
+const BAND: usize = 16;
 
 /// What is the same for all pixels.
 #[derive(Clone, Copy)]
@@ -91,27 +98,42 @@ impl Filtered<'_> {
         let rays = camera.rays(size);
         let prepare = |m: &Material| self.maps.method.prepare(&m.reflection, m.finish.gloss);
         let prepared: Vec<Prepared> = self.scene.materials.iter().map(prepare).collect();
-        let centre = |i: usize| DVec2::new((i % size.width) as f64 + 0.5, (i / size.width) as f64 + 0.5);
-        let hits: Vec<Option<(Hit, Place)>> =
-            (0..size.area()).into_par_iter().map(|i| self.look(&rays, centre(i))).collect();
         let how = How { lookups, prepared: &prepared };
-        let rows = (0..size.height).into_par_iter().map_init(
-            || Scratch { channels: Vec::new(), lights: Vec::new() },
-            |scratch, y| {
-                let mut row = Vec::with_capacity(size.width);
-                for i in y * size.width..(y + 1) * size.width {
-                    let colour = if outline(&hits, size, i) {
-                        self.parts(&rays, centre(i), how, scratch)
-                    } else {
-                        self.shade(&rays, hits[i].as_ref(), (centre(i), 1.0), (how, scratch))
-                    };
-                    row.push(colour.as_vec3());
-                }
-                row
-            },
-        );
-        let pixels: Vec<glam::Vec3> = rows.flatten_iter().collect();
-        Grid::from_vec(size, pixels).unwrap_or_else(|| unreachable!("one colour a pixel"))
+        let done = AtomicUsize::new(0);
+        let band = |first: usize| {
+            let band = self.band(&rays, size, first, how);
+            let rows = done.fetch_add(BAND, Ordering::Relaxed) + BAND;
+            (self.progress)((rows as f64 / size.height as f64).min(1.0));
+            band
+        };
+        let bands: Vec<usize> = (0..size.height).step_by(BAND).collect();
+        let bands: Vec<Vec<Vec3>> = bands.into_par_iter().map(band).collect();
+        Grid::from_vec(size, bands.concat()).unwrap_or_else(|| unreachable!("one colour a pixel"))
+    }
+
+    /// The rows from `first` on, [`BAND`] at most.
+    fn band(&self, rays: &Rays, size: Size, first: usize, how: How<'_>) -> Vec<Vec3> {
+        let last = (first + BAND).min(size.height);
+        // Outlines are seen from a pixel's neighbours, so a row more is looked at above and below.
+        let seen = first.saturating_sub(1)..(last + 1).min(size.height);
+        let centre = |x: usize, y: usize| DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+        let pixels = seen.clone().flat_map(|y| (0..size.width).map(move |x| (x, y)));
+        let hits: Vec<Option<(Hit, Place)>> = pixels.map(|(x, y)| self.look(rays, centre(x, y))).collect();
+        let height = seen.len();
+        let mut scratch = Scratch { channels: Vec::new(), lights: Vec::new() };
+        let mut colours = Vec::with_capacity((last - first) * size.width);
+        for y in first..last {
+            for x in 0..size.width {
+                let i = (y - seen.start) * size.width + x;
+                let colour = if outline(&hits, Size { height, ..size }, i) {
+                    self.parts(rays, centre(x, y), how, &mut scratch)
+                } else {
+                    self.shade(rays, hits[i].as_ref(), (centre(x, y), 1.0), (how, &mut scratch))
+                };
+                colours.push(colour.as_vec3());
+            }
+        }
+        colours
     }
 
     fn look(&self, rays: &Rays, at: DVec2) -> Option<(Hit, Place)> {

@@ -140,24 +140,30 @@ impl<'a> Truth<'a> {
         rays: usize,
         progress: &(dyn Fn(f64) + Sync),
     ) -> [Vec<Picture>; 2] {
-        let all = drift::cells(size);
-        let cell_rays = drift::cell_camera(camera, size).rays(all);
-        let each = rays.div_ceil(2 * all.area() / ((size.width + 1) * (size.height + 1))).max(1);
+        let cell_rays = drift::cell_camera(camera, size).rays(drift::cells(size));
+        let each = rays.div_ceil(2 * drift::CELLS).max(1);
+        let done = AtomicUsize::new(0);
+        let band = |half: u64, first: usize| {
+            let rows = drift::BAND.min(size.height - first);
+            let part = Size { height: rows, ..size };
+            let Size { width, height } = drift::cells(part);
+            let cell = |i: usize| {
+                let (x, y) = (i % width, first * drift::STEPS + i / width);
+                let mut random = Pcg64Mcg::seed_from_u64(mix([half, y as u64, x as u64]));
+                let corner = DVec2::new(x as f64, y as f64);
+                (0..each).map(|_| self.ray(&cell_rays, corner, 1.0, &mut random)).sum::<DVec3>() / each as f64
+            };
+            let cells: Vec<DVec3> = (0..width * height).map(cell).collect();
+            let rows = done.fetch_add(rows, Ordering::Relaxed) + rows;
+            progress(rows as f64 / (2 * size.height) as f64);
+            drift::frames(&cells, part)
+        };
+        let firsts: Vec<usize> = (0..size.height).step_by(drift::BAND).collect();
         [0, 1].map(|half| {
-            let mut cells = vec![DVec3::ZERO; all.area()];
-            let done = AtomicUsize::new(0);
-            cells.par_chunks_mut(all.width).enumerate().for_each(|(y, row)| {
-                for (x, cell) in row.iter_mut().enumerate() {
-                    let mut random = Pcg64Mcg::seed_from_u64(mix([half, y as u64, x as u64]));
-                    let sum: DVec3 = (0..each)
-                        .map(|_| self.ray(&cell_rays, DVec2::new(x as f64, y as f64), 1.0, &mut random))
-                        .sum();
-                    *cell = sum / each as f64;
-                }
-                let rows = done.fetch_add(1, Ordering::Relaxed) + 1;
-                progress((half as f64 + rows as f64 / all.height as f64) / 2.0);
-            });
-            drift::frames(&cells, size)
+            let bands: Vec<Vec<Picture>> = firsts.par_iter().map(|first| band(half, *first)).collect();
+            let row = |frame: usize, y: usize| bands[y / drift::BAND][frame].row(y % drift::BAND);
+            let frame = |frame| Grid::from_fn(size, |x, y| row(frame, y)[x]);
+            (0..drift::DRIFT_FRAMES).map(frame).collect()
         })
     }
 
