@@ -8,7 +8,7 @@ use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::Scene;
 use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
-use ndfmap_trace::truth::{Effort, TruePicture, Truth};
+use ndfmap_trace::truth::{Effort, Truth};
 use ndfmap_trace::{DRIFT_FRAMES, Geometry, drifted};
 use serde_json::{Map, Value, json};
 
@@ -29,22 +29,33 @@ pub(crate) struct Shot<'a> {
     pub(crate) truth: Option<Effort>,
     /// Measure sparkle, in every frame.
     pub(crate) sparkle: bool,
+    /// Keep every frame's pictures, for a contact sheet; a film would fill the memory.
+    pub(crate) keep: bool,
 }
 
-/// A frame: the truth, where asked for, and a picture by each method.
+/// A frame: what is said of the truth, where asked for, and of each method.
 pub(crate) struct Frame {
     pub(crate) time: f64,
     pub(crate) exposure: f32,
-    pub(crate) truth: Option<TruePicture>,
-    pub(crate) truth_seconds: f64,
+    pub(crate) truth: Option<Told>,
     /// How the truth changes as the camera drifts, where sparkle is measured.
     pub(crate) drifting: Option<Drifting>,
     pub(crate) takes: Vec<Take>,
+    /// The truth's picture, where there is one, then each method's; none when they are not kept.
+    pub(crate) pictures: Vec<Picture>,
 }
 
-/// One method's picture.
+/// What is said of a truth.
+#[derive(Clone, Copy)]
+pub(crate) struct Told {
+    pub(crate) rays: usize,
+    pub(crate) noise: f64,
+    pub(crate) seconds: f64,
+}
+
+/// What is said of one method's picture.
+#[derive(Clone, Copy)]
 pub(crate) struct Take {
-    pub(crate) picture: Picture,
     pub(crate) milliseconds: f64,
     /// Against the truth, where there is one.
     pub(crate) errors: Option<Errors>,
@@ -87,8 +98,11 @@ pub(crate) fn shoot(
             Some(first) => first,
             None => shot.stage.set(*time)?,
         };
-        let frame = frame(shot, &scene, *time, &baked);
+        let mut frame = frame(shot, &scene, *time, &baked);
         each(at, &frame)?;
+        if !shot.keep {
+            frame.pictures = Vec::new();
+        }
         frames.push(frame);
     }
     let methods = shot.methods.iter().map(|m| m.spelling()).collect();
@@ -104,7 +118,7 @@ fn frame(shot: &Shot<'_>, scene: &Scene, time: f64, baked: &[BakedMaps<'_>]) -> 
         let progress = Progress::new("truth");
         truth.render(&scene.camera, size, effort, &|f| progress.set(f))
     });
-    let truth_seconds = start.elapsed().as_secs_f64();
+    let seconds = start.elapsed().as_secs_f64();
     let moving = |render: &dyn Fn(usize) -> Picture| {
         let pictures: Vec<Picture> = (0..DRIFT_FRAMES).map(render).collect();
         change(&pictures, exposure)
@@ -128,10 +142,12 @@ fn frame(shot: &Shot<'_>, scene: &Scene, time: f64, baked: &[BakedMaps<'_>]) -> 
                 own / drifting.change.max(f64::MIN_POSITIVE)
             }),
         });
-        Take { picture, milliseconds, errors }
+        (Take { milliseconds, errors }, picture)
     };
-    let takes = baked.iter().map(take).collect();
-    Frame { time, exposure, truth, truth_seconds, drifting, takes }
+    let (takes, taken): (Vec<Take>, Vec<Picture>) = baked.iter().map(take).unzip();
+    let told = truth.as_ref().map(|t| Told { rays: t.rays, noise: t.noise, seconds });
+    let pictures = truth.map(|t| t.picture).into_iter().chain(taken).collect();
+    Frame { time, exposure, truth: told, drifting, takes, pictures }
 }
 
 /// How much the truth changes over a drift: [`change`] of its display values.
@@ -236,9 +252,10 @@ impl Reel {
 
     /// What is said about the truth, where there is one: rays a pixel, the worst noise, and the time of all frames.
     pub(crate) fn truth_json(&self) -> Option<Value> {
-        let rays = self.frames.iter().filter_map(|f| f.truth.as_ref().map(|t| t.rays)).max()?;
-        let noise = self.frames.iter().filter_map(|f| f.truth.as_ref().map(|t| t.noise)).fold(0.0, f64::max);
-        let seconds: f64 = self.frames.iter().map(|f| f.truth_seconds).sum();
+        let all = || self.frames.iter().filter_map(|f| f.truth);
+        let rays = all().map(|t| t.rays).max()?;
+        let noise = all().map(|t| t.noise).fold(0.0, f64::max);
+        let seconds: f64 = all().map(|t| t.seconds).sum();
         let mut value = json!({ "rays_per_pixel": rays, "noise": noise, "seconds": seconds });
         if let Some(drifting) =
             self.frames.iter().filter_map(|f| f.drifting).max_by(|a, b| a.noise.total_cmp(&b.noise))
@@ -268,10 +285,10 @@ impl Reel {
             text.push('\n');
         }
         for f in &self.frames {
-            if let Some(truth) = &f.truth {
+            if let Some(truth) = f.truth {
                 text += &format!(
                     "truth at time {}: {} rays a pixel, noise {:.4}, {:.1} s\n",
-                    f.time, truth.rays, truth.noise, f.truth_seconds
+                    f.time, truth.rays, truth.noise, truth.seconds
                 );
             }
             if let Some(Drifting { change, noise }) = f.drifting {

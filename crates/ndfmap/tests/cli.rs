@@ -550,7 +550,12 @@ fn render_used_wrongly_says_what_is_wrong() {
     let folder = tempfile::tempdir().unwrap();
     let model = text(&folder.path().join("broken.glb"));
     std::fs::write(&model, b"glTF\x02\x00\x00\x00").unwrap();
-    let cases: [(&[&str], i32, &str); 12] = [
+    let cases: [(&[&str], i32, &str); 13] = [
+        (
+            &["--scene", "disk", "--frames", "900", "--size", "900", "--compare", "b.png"],
+            2,
+            "the contact sheet would be",
+        ),
         (&["--scene", "dsk", "-o", "a.png"], 2, "did you mean `disk`"),
         (&["--scene", "disk"], 2, "--output"),
         (&["--scene", "disk", "-o", "a.jpg"], 2, "pictures are written as .png or .exr"),

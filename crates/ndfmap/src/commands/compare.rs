@@ -197,6 +197,7 @@ impl Run<'_> {
             lookups: pictures.lookups,
             truth: Some(pictures.truth),
             sparkle: pictures.sparkle,
+            keep: true,
         };
         shoot(&shot, &mut |_, _| Ok(()))
     }

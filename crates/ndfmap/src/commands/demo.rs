@@ -56,6 +56,7 @@ fn sheet(scene: &str, times: &[f64]) -> Result<Vec<u8>, Failure> {
         lookups: Lookups { filtering: Filtering::fine(16), ..Lookups::TRILINEAR },
         truth: Some(Effort { rays: 128, noise: 0.0, seed: 0 }),
         sparkle: false,
+        keep: true,
     };
     pictures::draw(&shoot(&shot, &mut |_, _| Ok(()))?, scene)
 }

@@ -24,7 +24,7 @@ use super::arguments::{
 use super::{print, print_json, say_if_replaced, warn};
 use crate::Failure;
 use crate::imaging::{Frame, Reel, Shot, shoot};
-use crate::report::pictures;
+use crate::report::pictures::{self, Plan};
 use crate::staging::{CameraArgument, Stage};
 
 /// Render a scene through baked maps, and by brute force to compare
@@ -232,6 +232,9 @@ pub(super) fn filter(text: &str) -> Result<Filtering, String> {
     known.ok_or_else(|| "must be `trilinear`, or `anisotropic:N` or `fine:N` with N from 1 to 64".to_owned())
 }
 
+/// Most pixels of a contact sheet.
+const MAX_SHEET: usize = 1 << 27;
+
 /// Checks that a picture can be written under this name.
 fn checked(path: &Path) -> Result<(), Failure> {
     match PictureFormat::of(path) {
@@ -275,7 +278,16 @@ impl Render {
                 seed: 0,
             }),
             sparkle: self.sparkle,
+            keep: self.compare.is_some(),
         };
+        if shot.keep {
+            let sheet = Plan::new(self.size, self.truth.is_some(), methods.len(), times.len()).size();
+            if sheet.area() > MAX_SHEET {
+                let why = "make `--size` smaller, or the frames or methods fewer";
+                let (width, height) = (sheet.width, sheet.height);
+                return Err(Failure::Usage(format!("the contact sheet would be {width} × {height}: {why}")));
+            }
+        }
         let mut written = Vec::new();
         let reel = shoot(&shot, &mut |at, frame| self.write(at, times.len(), frame, &mut written))?;
         if let Some(sheet) = &self.compare {
@@ -330,8 +342,8 @@ impl Render {
         frame: &Frame,
         written: &mut Vec<PathBuf>,
     ) -> Result<(), Failure> {
-        let picture = frame.takes.first().map(|t| &t.picture);
-        let truth = frame.truth.as_ref().map(|t| &t.picture);
+        let truth = frame.truth.and(frame.pictures.first());
+        let picture = frame.pictures.get(usize::from(truth.is_some()));
         for (path, picture) in [(&self.output, picture), (&self.truth_output, truth)] {
             let (Some(path), Some(picture)) = (path, picture) else { continue };
             let path = if frames > 1 { numbered(path, at) } else { path.clone() };

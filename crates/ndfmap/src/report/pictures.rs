@@ -1,5 +1,6 @@
 //! The contact sheet of a rendering: truth and every method side by side, their differences, and the errors under them.
 
+use ndfmap_core::grid::Size;
 use ndfmap_core::metrics::{Picture, display};
 use ndfmap_maps::picture::to_bytes;
 
@@ -10,55 +11,82 @@ use crate::imaging::{Errors, Reel};
 /// Difference of display values, over sqrt 3, that is drawn brightest.
 const BRIGHTEST: f32 = 0.5;
 
+/// Where things are on a sheet.
+pub(crate) struct Plan {
+    picture: Size,
+    has_truth: bool,
+    columns: usize,
+    frames: usize,
+}
+
+/// Between pictures, and above the first.
+const GAP: usize = 8;
+const TOP: usize = 4 * LINE;
+
+impl Plan {
+    /// A sheet for this many methods and frames of pictures of a size, perhaps with the truth.
+    pub(crate) fn new(picture: Size, has_truth: bool, methods: usize, frames: usize) -> Self {
+        Self { picture, has_truth, columns: methods + usize::from(has_truth), frames }
+    }
+
+    /// Width and height of the sheet.
+    pub(crate) fn size(&self) -> Size {
+        Size { width: GAP + self.columns * self.step_x(), height: TOP + self.frames * self.step_y() }
+    }
+
+    fn step_x(&self) -> usize {
+        self.picture.width.max(24 * LETTER) + GAP
+    }
+
+    /// A frame's pictures, their differences where there is a truth, and lines of text.
+    fn step_y(&self) -> usize {
+        (if self.has_truth { 2 } else { 1 }) * (self.picture.height + GAP) + 4 * LINE
+    }
+}
+
 /// Draws the sheet as a PNG file: two rows a frame where there is a truth, else one.
 pub(crate) fn draw(reel: &Reel, title: &str) -> Result<Vec<u8>, Failure> {
     let Some(first) = reel.frames.first() else { return Canvas::new(1, 1).to_png() };
-    let size = first.takes[0].picture.size();
     let has_truth = first.truth.is_some();
-    let (gap, label) = (8, 2 * LINE);
-    let step_x = size.width.max(24 * LETTER) + gap;
-    let rows = if has_truth { 2 } else { 1 };
-    let step_y = rows * (size.height + gap) + 3 * LINE;
-    let columns = reel.methods.len() + usize::from(has_truth);
-    let mut canvas = Canvas::new(
-        gap + (columns * step_x).max((title.len() + 2) * LETTER),
-        2 * LINE + label + reel.frames.len() * step_y,
-    );
-    canvas.text(gap, 8, title);
+    let size = first.pictures[0].size();
+    let plan = Plan::new(size, has_truth, reel.methods.len(), reel.frames.len());
+    let Size { width, height } = plan.size();
+    let mut canvas = Canvas::new(width.max((title.len() + 2) * LETTER), height);
+    canvas.text(GAP, 8, title);
+    let column = |at: usize| GAP + at * plan.step_x();
     for (row, frame) in reel.frames.iter().enumerate() {
-        let y = 2 * LINE + label + row * step_y;
-        let column = |at: usize| gap + at * step_x;
-        let mut at = 0;
-        if let Some(truth) = &frame.truth {
-            paint(&mut canvas, (column(0), y), &truth.picture, frame.exposure);
-            let below = y + size.height + gap;
-            canvas.text(column(0), below, &format!("time {:.3}", frame.time));
-            canvas.text(column(0), below + LINE, &format!("{} rays a pixel", truth.rays));
-            canvas.text(column(0), below + 2 * LINE, &format!("noise {:.4}", truth.noise));
-            canvas.text(column(0), below + 4 * LINE, "right: difference,");
-            canvas.text(column(0), below + 5 * LINE, &format!("{BRIGHTEST} and more is light"));
-            at = 1;
+        let y = TOP + row * plan.step_y();
+        let below = y + size.height + GAP;
+        for (at, picture) in frame.pictures.iter().enumerate() {
+            paint(&mut canvas, (column(at), y), picture, frame.exposure);
         }
-        for take in &frame.takes {
-            paint(&mut canvas, (column(at), y), &take.picture, frame.exposure);
-            if let (Some(truth), Some(errors)) = (&frame.truth, take.errors) {
-                let below = y + size.height + gap;
-                difference(&mut canvas, (column(at), below), (&take.picture, &truth.picture), frame.exposure);
-                let [first, second] = lines(errors);
-                canvas.text(column(at), below + size.height + 3, &first);
-                canvas.text(column(at), below + size.height + 3 + LINE, &second);
+        if let (Some(told), Some((truth, taken))) = (frame.truth, frame.pictures.split_first()) {
+            let lines = [
+                format!("time {:.3}", frame.time),
+                format!("{} rays a pixel", told.rays),
+                format!("noise {:.4}", told.noise),
+                "right: difference,".to_owned(),
+                format!("{BRIGHTEST} and more is light"),
+            ];
+            for (line, text) in lines.iter().enumerate() {
+                canvas.text(column(0), below + line * LINE, text);
             }
-            at += 1;
+            for (at, (take, picture)) in frame.takes.iter().zip(taken).enumerate() {
+                difference(&mut canvas, (column(at + 1), below), (picture, truth), frame.exposure);
+                for (line, text) in take.errors.iter().flat_map(|e| lines_of(*e)).enumerate() {
+                    canvas.text(column(at + 1), below + size.height + 3 + line * LINE, &text);
+                }
+            }
         }
     }
     let names = has_truth.then(|| "truth".to_owned()).into_iter().chain(reel.methods.iter().cloned());
     for (at, name) in names.enumerate() {
-        canvas.text(gap + at * step_x, 2 * LINE + 8, &name);
+        canvas.text(column(at), 2 * LINE + 8, &name);
     }
     canvas.to_png()
 }
 
-fn lines(e: Errors) -> [String; 2] {
+fn lines_of(e: Errors) -> [String; 2] {
     let flip = e.flip.map_or_else(String::new, |f| format!("flip {f:.3} "));
     let sparkle = e.sparkle.map_or_else(String::new, |s| format!("sparkle {s:.2}"));
     [format!("color {:.4} l2 {:.3}", e.color_error, e.relative_l2), flip + &sparkle]
