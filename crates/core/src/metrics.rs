@@ -23,7 +23,7 @@ pub fn display(colour: Vec3, exposure: f32) -> Vec3 {
     Vec3::from_array((colour * exposure).to_array().map(display_value))
 }
 
-/// `|a - truth| / |truth|` over all pixels and channels of the linear pictures.
+/// `|a - truth| / |truth|` over all pixels and channels of the linear pictures; `|a|` where the truth is black.
 ///
 /// # Panics
 /// When the pictures differ in size, as in all metrics here.

@@ -180,3 +180,34 @@ fn damaged_models_are_errors_or_models() {
     }
     assert!(refused > 100, "{refused}");
 }
+
+#[test]
+fn gltf_that_would_never_end_is_refused() {
+    let text = String::from_utf8(gltf()).unwrap();
+    // Nodes that each have the next one twice: 2^40 ways through a file of forty.
+    let node = |i: usize| serde_json::json!({ "children": [i + 1, i + 1] });
+    let mut nodes: Vec<serde_json::Value> = (0..40).map(node).collect();
+    nodes.push(serde_json::json!({ "mesh": 0 }));
+    let mut document: serde_json::Value = serde_json::from_str(&text).unwrap();
+    document["nodes"] = nodes.into();
+    let error = read("a.gltf", document.to_string().as_bytes()).err().unwrap().to_string();
+    assert!(error.contains("two places"), "{error}");
+    for uri in ["/dev/zero", "file:/dev/zero", "https://example.org/a.bin"] {
+        let mut document: serde_json::Value = serde_json::from_str(&text).unwrap();
+        document["buffers"][0]["uri"] = uri.into();
+        let error = read("a.gltf", document.to_string().as_bytes()).err().unwrap().to_string();
+        assert!(error.contains("not a file beside it"), "{error}");
+    }
+}
+
+#[test]
+fn a_map_of_ones_own_leaves_the_mean_colour() {
+    let map = ndfmap_core::procedural::find("foil").unwrap().build;
+    let map = map(ndfmap_core::grid::Size::new(4, 4).unwrap());
+    let staging = Staging { map: Some(map.into()), ..Staging::default() };
+    let (scene, warnings) = model_of_bytes(Path::new("a.gltf"), &gltf(), &ModelOptions { staging }).unwrap();
+    assert!(warnings[0].contains("left out"), "{warnings:?}");
+    let finish = scene.materials[0].finish;
+    // Half red, half blue, of metalness 0.25.
+    assert!((finish.diffuse - DVec3::new(0.375, 0.0, 0.375)).length() < 1e-5, "{finish:?}");
+}

@@ -92,12 +92,11 @@ pub(crate) fn shoot(
         bake_seconds.push(start.elapsed().as_secs_f64());
     }
     let mut frames = Vec::new();
-    let mut scene = Some(first);
+    let mut scene = first;
     for (at, time) in shot.times.iter().enumerate() {
-        let scene = match scene.take() {
-            Some(first) => first,
-            None => shot.stage.set(*time)?,
-        };
+        if at > 0 && shot.stage.moves() {
+            scene = shot.stage.set(*time)?;
+        }
         let mut frame = frame(shot, &scene, *time, &baked);
         each(at, &frame)?;
         if !shot.keep {

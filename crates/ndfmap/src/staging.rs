@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use ndfmap_core::grid::Size;
 use ndfmap_core::light::Light;
 use ndfmap_core::reflection::Model;
@@ -18,7 +18,7 @@ use crate::Failure;
 pub(crate) struct Stage {
     /// Name of a built-in scene, or a model file.
     pub(crate) scene: String,
-    /// Map of the first material, and a name for it.
+    /// Map of the first material.
     pub(crate) map: Option<Arc<dyn Surface>>,
     /// Size of built-in maps.
     pub(crate) map_size: Option<Size>,
@@ -41,6 +41,11 @@ pub(crate) struct CameraArgument {
 }
 
 impl Stage {
+    /// True for a scene that depends on time; models do not.
+    pub(crate) fn moves(&self) -> bool {
+        scene::find(&self.scene).is_some()
+    }
+
     /// The scene at a time.
     pub(crate) fn set(&self, time: f64) -> Result<Scene, Failure> {
         let mut staging = Staging { time, map: self.map.clone(), ..Staging::default() };
@@ -71,10 +76,7 @@ impl Stage {
         }
         if let Some(camera) = self.camera {
             let degrees = camera.degrees.unwrap_or(scene.camera.degrees);
-            scene.camera = Camera {
-                shift: DVec2::ZERO,
-                ..Camera::new(camera.eye.into(), camera.target.into(), degrees)
-            };
+            scene.camera = Camera::new(camera.eye.into(), camera.target.into(), degrees);
         }
         if !self.lights.is_empty() {
             scene.lights.clone_from(&self.lights);

@@ -15,6 +15,10 @@ pub struct Geometry {
     triangles: Vec<Triangle>,
     /// `None` for a scene without triangles.
     hierarchy: Option<CwBvh>,
+    /// A sphere around everything. Boxes are in single floats, so they and the rays are taken from its middle, and rays
+    /// from where they enter it: however far away the scene or the eye may be, digits go to what is between.
+    middle: DVec3,
+    radius: f64,
 }
 
 struct Triangle {
@@ -63,13 +67,18 @@ impl Geometry {
             };
             triangles.extend(o.mesh.triangles.iter().map(of));
         }
-        let boxes: Vec<Aabb> = triangles
-            .iter()
-            .map(|t| Aabb::from_points(&t.corners.map(|c| Vec3A::from(c.position))))
-            .collect();
+        let (middle, radius) = scene.bounds();
+        // Some steps of a single float at the sphere's radius, for what rays and boxes lose by rounding.
+        let margin = Vec3A::splat((4.0 * f64::from(f32::EPSILON) * radius) as f32);
+        let around = |t: &Triangle| {
+            let corners = t.corners.map(|c| (c.position.as_dvec3() - middle).as_vec3a());
+            let Aabb { min, max } = Aabb::from_points(&corners);
+            Aabb::new(min - margin, max + margin)
+        };
+        let boxes: Vec<Aabb> = triangles.iter().map(around).collect();
         let build = || build_cwbvh(&boxes, BvhBuildParams::medium_build(), &mut Duration::default());
         let hierarchy = (!boxes.is_empty()).then(build);
-        Self { triangles, hierarchy }
+        Self { triangles, hierarchy, middle, radius }
     }
 
     /// Number of triangles.
@@ -88,7 +97,9 @@ impl Geometry {
     #[must_use]
     pub fn hit(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
         let hierarchy = self.hierarchy.as_ref()?;
-        let ray = Ray::new_inf(origin.as_vec3a(), direction.as_vec3a());
+        let from = origin - self.middle;
+        let skipped = (from.length() - 1.01 * self.radius).max(0.0);
+        let ray = Ray::new_inf((from + direction * skipped).as_vec3a(), direction.as_vec3a());
         let mut nearest: Option<Hit> = None;
         hierarchy.ray_traverse(ray, &mut RayHit::none(), |_, i| {
             let triangle = hierarchy.primitive_indices[i];
@@ -97,7 +108,7 @@ impl Geometry {
                     if nearest.is_none_or(|n| distance < n.distance) {
                         nearest = Some(Hit { triangle, distance, barycentric });
                     }
-                    distance as f32
+                    (distance - skipped) as f32
                 }
                 None => f32::INFINITY,
             }

@@ -329,3 +329,22 @@ fn finer_filters_are_nearer_to_the_truth() {
         (error(Filtering::TRILINEAR), error(Filtering::anisotropic(16)), error(Filtering::fine(16)));
     assert!(fine < long && long < plain, "{plain} {long} {fine}");
 }
+
+#[test]
+fn scenes_far_from_everything_have_no_holes() {
+    // A fine mesh a million away from the origin, seen from a million away from it.
+    let mut scene = (scene::find("sphere").unwrap().build)(&Staging::default());
+    let away = Vec3::new(1e6, -2e6, 5e5);
+    let mut mesh = Mesh::clone(&scene.objects[0].mesh);
+    mesh.vertices.iter_mut().for_each(|v| v.position = v.position * 1e4 + away);
+    scene.objects[0].mesh = Arc::new(mesh);
+    let middle = away.as_dvec3();
+    scene.camera = Camera::new((middle + DVec3::new(0.0, 0.0, 1e6)).into(), middle.into(), 0.5);
+    let geometry = Geometry::new(&scene);
+    let rays = scene.camera.rays(Size { width: 64, height: 64 });
+    for i in 0..64 * 64 {
+        // All rays within 0.25 degrees of the middle meet a ball of radius 1e4 at 1e6.
+        let at = glam::DVec2::new((i % 64) as f64 + 0.5, (i / 64) as f64 + 0.5);
+        assert!(geometry.hit(rays.eye, rays.direction(at)).is_some(), "{at}");
+    }
+}

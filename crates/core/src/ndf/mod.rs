@@ -28,7 +28,7 @@ pub use mixture::{Cosine, Lobes, Shaded};
 pub use naive::Naive;
 pub use ndm::{Kernel, Ndm, Normalisation};
 pub use phong::{Phong, PhongPeaks};
-pub use reflect::{Filtered, Lit, Prepared};
+pub use reflect::{FilteredTexel, Lit, Prepared};
 pub use sh::{Coefficients, Sh};
 pub use slopes::{SlopeGaussian, SlopeMoments, Slopes};
 pub use toksvig::{Lobe, Toksvig};
@@ -283,8 +283,8 @@ pub trait Method: Debug + Send + Sync {
     /// What shading wants to know of a material, the same for all its texels.
     fn prepare(&self, reflection: &Reflection, gloss: SlopeVariance) -> Prepared;
 
-    /// The light that a texel with these filtered channels sends to the eye; see [`Filtered`].
-    fn reflect(&self, texel: &Filtered<'_>, reflection: &Reflection, lights: &[Lit]) -> DVec3;
+    /// The light that a texel with these filtered channels sends to the eye; see [`FilteredTexel`].
+    fn reflect(&self, texel: &FilteredTexel<'_>, reflection: &Reflection, lights: &[Lit]) -> DVec3;
 
     /// What it makes of a flat map.
     fn flat_lobe(&self, brdf: &dyn Brdf) -> FlatLobe;
@@ -348,7 +348,7 @@ impl<R: Representation> Method for R {
         Prepared { gloss, lobe, tables }
     }
 
-    fn reflect(&self, texel: &Filtered<'_>, reflection: &Reflection, lights: &[Lit]) -> DVec3 {
+    fn reflect(&self, texel: &FilteredTexel<'_>, reflection: &Reflection, lights: &[Lit]) -> DVec3 {
         reflect::reflect(self, texel, reflection, lights)
     }
 

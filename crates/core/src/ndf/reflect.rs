@@ -34,7 +34,7 @@ pub struct Prepared {
 
 /// A filtered texel.
 #[derive(Clone, Copy)]
-pub struct Filtered<'a> {
+pub struct FilteredTexel<'a> {
     /// Channels as filtered, four a layer.
     pub channels: &'a [f32],
     /// What it is made of: in the layer of a lobe, or (`None`) over all.
@@ -48,7 +48,7 @@ pub struct Filtered<'a> {
 /// Light that a filtered texel sends to the eye.
 pub(super) fn reflect<R: Representation + ?Sized>(
     representation: &R,
-    texel: &Filtered<'_>,
+    texel: &FilteredTexel<'_>,
     reflection: &Reflection,
     lights: &[Lit],
 ) -> DVec3 {
@@ -175,7 +175,7 @@ mod tests {
                     let exact =
                         normals.iter().map(bright).sum::<f64>() / normals.iter().map(lobe).sum::<f64>();
                     let by = |at_means| {
-                        let texel = Filtered {
+                        let texel = FilteredTexel {
                             channels: &channels,
                             finish: &|_| finish,
                             prepared: &prepared,

@@ -2,9 +2,12 @@
 
 use std::sync::Arc;
 
+use glam::DVec3;
+
 use crate::grid::Grid;
 use crate::reflection::{Finish, Reflection};
 use crate::surface::Surface;
+use crate::units::SlopeVariance;
 
 /// A [`Finish`] for each texel.
 #[derive(Clone, Debug)]
@@ -13,6 +16,37 @@ pub struct FinishMap {
     pub diffuse_gloss: Arc<Grid<[f32; 4]>>,
     /// Specular colour, where it changes from place to place; the fourth is 1.
     pub specular: Option<Arc<Grid<[f32; 4]>>>,
+}
+
+impl FinishMap {
+    /// What a texel is made of; `specular` where the map has none.
+    #[must_use]
+    pub fn at(&self, x: usize, y: usize, specular: DVec3) -> Finish {
+        let of = |map: &Grid<[f32; 4]>| map.row(y)[x];
+        Self::finish(of(&self.diffuse_gloss), self.specular.as_deref().map(of), specular)
+    }
+
+    /// A finish from its channels, filtered or not.
+    #[must_use]
+    pub fn finish(diffuse_gloss: [f32; 4], mapped: Option<[f32; 4]>, specular: DVec3) -> Finish {
+        let colour = |[r, g, b, _]: [f32; 4]| DVec3::new(r.into(), g.into(), b.into());
+        Finish {
+            diffuse: colour(diffuse_gloss),
+            specular: mapped.map_or(specular, colour),
+            gloss: SlopeVariance::clamped(diffuse_gloss[3].into()),
+        }
+    }
+
+    /// The map with the specular colour as albedo, where it is the brighter.
+    #[must_use]
+    pub(super) fn without_highlight(self) -> Self {
+        let Some(specular) = &self.specular else { return self };
+        let brighter = |x: usize, y: usize| {
+            let ([r, g, b, gloss], s) = (self.diffuse_gloss.row(y)[x], specular.row(y)[x]);
+            [r.max(s[0]), g.max(s[1]), b.max(s[2]), gloss]
+        };
+        Self { diffuse_gloss: Grid::from_fn(specular.size(), brighter).into(), specular: None }
+    }
 }
 
 /// What an object is made of.

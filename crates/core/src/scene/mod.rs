@@ -128,6 +128,7 @@ impl Scene {
             material.reflection.lobe = brdf::parse(spelling)?;
             if material.reflection.lobe.argument() == Argument::Light {
                 material.finish.diffuse = material.finish.diffuse.max(material.finish.specular);
+                material.finish_map = material.finish_map.take().map(FinishMap::without_highlight);
             }
         }
         Ok(())
@@ -138,7 +139,7 @@ impl Scene {
         self.materials.iter_mut().for_each(|m| m.reflection.model = model);
     }
 
-    /// The smallest sphere around the middle of the scene's bounds that holds it: centre and radius.
+    /// A sphere that holds the scene, around the middle of its box: centre and radius.
     #[must_use]
     pub fn bounds(&self) -> (DVec3, f64) {
         let places = || self.objects.iter().flat_map(|o| &o.mesh.vertices).map(|v| v.position);

@@ -1,9 +1,11 @@
 //! glTF 2.0 by the `gltf` crate: meshes in the pose of the file, and metallic-roughness materials.
 //!
 //! Read: positions, normals, tangents, the normal texture's coordinates (with `KHR_texture_transform` and scale), base
-//! colour, metalness and roughness, factors and textures. Colours and roughness are sampled at the texels of the
+//! colour, metalness and roughness, factors and textures. Colours and roughness are averaged over the texels of the
 //! normal map. Not read: animation, skins, morphs, occlusion, emission, alpha, cameras and lights.
 
+use std::borrow::Cow;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -11,12 +13,13 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use glam::{DVec3, Mat3, Mat4, Vec2, Vec3, Vec4};
 use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::pyramid::footprint;
 use ndfmap_core::reflection::Finish;
 use ndfmap_core::scene::{FinishMap, Material};
 use ndfmap_core::surface::{Surface, SurfaceRow, Wrap, Wraps, unit_or_up};
 use ndfmap_core::units::{Alpha, PerceptualRoughness, SlopeVariance};
 
-use super::{ModelFormat, Parts, RawMesh, flat, microfacets};
+use super::{MAX_ELEMENTS, ModelFormat, Parts, RawMesh, flat, microfacets};
 use crate::attribute::{Transfer, attribute_of_image};
 use crate::formats::{read_file, read_image};
 use crate::source::{SourceOptions, source_of_image};
@@ -24,7 +27,7 @@ use crate::{Image, MapError, SourceKind};
 
 pub(super) const FORMAT: ModelFormat = ModelFormat { name: "glTF", extensions: &["gltf", "glb"], read };
 
-/// Smoothest surface that is told from a mirror: a highlight of a point light has to be found by chance.
+/// Smoothest surface that is told from a mirror: narrower highlights fall between the rays of any truth.
 const LEAST_ROUGHNESS: f64 = 0.05;
 
 /// Deepest tree of nodes.
@@ -36,9 +39,10 @@ fn read(path: &Path, bytes: &[u8], warnings: &mut Vec<String>) -> Result<Parts, 
         .buffers()
         .map(|buffer| match buffer.source() {
             gltf::buffer::Source::Bin => {
-                document.blob.clone().ok_or_else(|| MapError::invalid(path, "lacks its binary chunk"))
+                let blob = document.blob.as_deref().map(Cow::Borrowed);
+                blob.ok_or_else(|| MapError::invalid(path, "lacks its binary chunk"))
             }
-            gltf::buffer::Source::Uri(uri) => resource(path, uri).map(|(_, bytes)| bytes),
+            gltf::buffer::Source::Uri(uri) => resource(path, uri).map(|(_, bytes)| Cow::Owned(bytes)),
         })
         .collect::<Result<Vec<_>, _>>()?;
     let files = Files { path, buffers };
@@ -48,7 +52,14 @@ fn read(path: &Path, bytes: &[u8], warnings: &mut Vec<String>) -> Result<Parts, 
     }
     // What has no material gets glTF's default one, at the end.
     materials.push(super::plain());
-    let mut walk = Walk { files: &files, plain: materials.len() - 1, meshes: Vec::new() };
+    let mut walk = Walk {
+        files: &files,
+        plain: materials.len() - 1,
+        meshes: Vec::new(),
+        seen: HashSet::new(),
+        elements: 0,
+        left_out: 0,
+    };
     let scene = document.default_scene().or_else(|| document.scenes().next());
     for node in scene.iter().flat_map(gltf::Scene::nodes) {
         walk.node(&node, Mat4::IDENTITY, 0)?;
@@ -56,13 +67,19 @@ fn read(path: &Path, bytes: &[u8], warnings: &mut Vec<String>) -> Result<Parts, 
     if document.animations().len() + document.skins().len() > 0 {
         warnings.push("is animated: only the pose of the file is shown".to_owned());
     }
+    if walk.left_out > 0 {
+        warnings.push(format!(
+            "has {} parts that are strips, fans, lines or points, which are left out",
+            walk.left_out
+        ));
+    }
     Ok(Parts { meshes: walk.meshes, materials })
 }
 
 /// The document's files.
 struct Files<'a> {
     path: &'a Path,
-    buffers: Vec<Vec<u8>>,
+    buffers: Vec<Cow<'a, [u8]>>,
 }
 
 /// The bytes behind a URI, and a path to name them by.
@@ -75,10 +92,16 @@ fn resource(path: &Path, uri: &str) -> Result<(PathBuf, Vec<u8>), MapError> {
             .map_err(|e| MapError::invalid(path, format!("has a damaged data URI: {e}")))?;
         return Ok((path.to_owned(), bytes));
     }
-    if uri.contains("://") {
+    let name = percent_decoded(uri);
+    let relative = !name.contains(':') && !Path::new(&name).has_root();
+    if !relative {
         return Err(MapError::unsupported(path, format!("names `{uri}`, which is not a file beside it")));
     }
-    let file = path.with_file_name("").join(percent_decoded(uri));
+    let file = path.with_file_name("").join(name);
+    // Not a device or a pipe, which would never end.
+    if file.exists() && !file.is_file() {
+        return Err(MapError::invalid(&file, "is no file"));
+    }
     let bytes = read_file(&file)?;
     Ok((file, bytes))
 }
@@ -88,7 +111,10 @@ fn percent_decoded(uri: &str) -> String {
     let mut bytes = Vec::new();
     let mut rest = uri.as_bytes();
     while let Some((first, tail)) = rest.split_first() {
-        let code = tail.get(..2).and_then(|hex| std::str::from_utf8(hex).ok());
+        let code = tail
+            .get(..2)
+            .filter(|hex| hex.iter().all(u8::is_ascii_hexdigit))
+            .and_then(|hex| std::str::from_utf8(hex).ok());
         match code.and_then(|hex| u8::from_str_radix(hex, 16).ok()) {
             Some(byte) if *first == b'%' => {
                 bytes.push(byte);
@@ -211,12 +237,20 @@ impl Files<'_> {
             });
         }
         let size = surface.size();
+        // The mean of what lies under a texel of the normal map, or where that is finer, the texel it lies in.
         let sample = |map: &Option<Grid<[f32; 4]>>, x: usize, y: usize| {
-            map.as_ref().map_or([1.0; 4], |map| {
-                let from = map.size();
-                map.row((2 * y + 1) * from.height / (2 * size.height))
-                    [(2 * x + 1) * from.width / (2 * size.width)]
-            })
+            let Some(map) = map else { return [1.0; 4] };
+            let from = map.size();
+            let (columns, column) = footprint(from.width, size.width, x);
+            let (rows, row) = footprint(from.height, size.height, y);
+            let mut sum = [0.0; 4];
+            for r in rows {
+                for c in columns.clone() {
+                    let weight = (row(r) * column(c)) as f32;
+                    sum.iter_mut().zip(map.row(r)[c]).for_each(|(s, v)| *s += weight * v);
+                }
+            }
+            sum
         };
         let at = |x: usize, y: usize| factors.finish(sample(&base, x, y), sample(&metal_rough, x, y)).0;
         let rgb = |c: DVec3, w: f64| [c.x as f32, c.y as f32, c.z as f32, w as f32];
@@ -225,10 +259,23 @@ impl Files<'_> {
             rgb(finish.diffuse, finish.gloss.get())
         });
         let specular = Grid::from_fn(size, |x, y| rgb(at(x, y).specular, 1.0));
+        let finish = mean_finish(&diffuse_gloss, &specular);
         let finish_map =
             Some(FinishMap { diffuse_gloss: diffuse_gloss.into(), specular: Some(specular.into()) });
         // The lobe itself is as sharp as can be; all its width is in the map.
         Ok(Material { name, surface, finish, finish_map, reflection: microfacets(0.0) })
+    }
+}
+
+/// The mean over a map, for when the map is taken away.
+fn mean_finish(diffuse_gloss: &Grid<[f32; 4]>, specular: &Grid<[f32; 4]>) -> Finish {
+    let mean = |map: &Grid<[f32; 4]>, c: usize| {
+        map.texels().iter().map(|t| f64::from(t[c])).sum::<f64>() / map.texels().len() as f64
+    };
+    Finish {
+        diffuse: DVec3::from([0, 1, 2].map(|c| mean(diffuse_gloss, c))),
+        specular: DVec3::from([0, 1, 2].map(|c| mean(specular, c))),
+        gloss: SlopeVariance::clamped(mean(diffuse_gloss, 3)),
     }
 }
 
@@ -265,6 +312,12 @@ struct Walk<'a> {
     files: &'a Files<'a>,
     plain: usize,
     meshes: Vec<(RawMesh, usize)>,
+    /// Nodes that have been gone through: a tree has each once.
+    seen: HashSet<usize>,
+    /// Vertices and indices so far.
+    elements: usize,
+    /// Primitives that are no triangles.
+    left_out: usize,
 }
 
 impl Walk<'_> {
@@ -272,11 +325,19 @@ impl Walk<'_> {
         if depth > MAX_DEPTH {
             return Err(MapError::invalid(self.files.path, format!("has nodes more than {MAX_DEPTH} deep")));
         }
+        if !self.seen.insert(node.index()) {
+            return Err(MapError::invalid(
+                self.files.path,
+                format!("has its node {} in two places", node.index()),
+            ));
+        }
         let pose = above * Mat4::from_cols_array_2d(&node.transform().matrix());
         for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
             if primitive.mode() == gltf::mesh::Mode::Triangles {
                 let mesh = self.primitive(&primitive, pose)?;
                 self.meshes.push((mesh, primitive.material().index().unwrap_or(self.plain)));
+            } else {
+                self.left_out += 1;
             }
         }
         for child in node.children() {
@@ -285,15 +346,24 @@ impl Walk<'_> {
         Ok(())
     }
 
-    fn primitive(&self, primitive: &gltf::Primitive<'_>, pose: Mat4) -> Result<RawMesh, MapError> {
+    fn primitive(&mut self, primitive: &gltf::Primitive<'_>, pose: Mat4) -> Result<RawMesh, MapError> {
         let path = self.files.path;
-        let held: usize = self.files.buffers.iter().map(Vec::len).sum();
+        let held: usize = self.files.buffers.iter().map(|b| b.len()).sum();
         let counts =
             primitive.attributes().map(|(_, a)| a.count()).chain(primitive.indices().map(|a| a.count()));
-        if counts.into_iter().any(|count| count > held) {
-            return Err(MapError::invalid(path, "announces more vertices than its buffers can hold"));
+        for count in counts {
+            if count > held {
+                return Err(MapError::invalid(path, "announces more vertices than its buffers can hold"));
+            }
+            self.elements += count;
         }
-        let reader = primitive.reader(|buffer| self.files.buffers.get(buffer.index()).map(Vec::as_slice));
+        if self.elements > 4 * MAX_ELEMENTS {
+            return Err(MapError::unsupported(
+                path,
+                format!("has more than {MAX_ELEMENTS} vertices or triangles"),
+            ));
+        }
+        let reader = primitive.reader(|buffer| self.files.buffers.get(buffer.index()).map(|b| &**b));
         let turn = Mat3::from_mat4(pose);
         let lasting = turn.inverse().transpose();
         let mirrored = turn.determinant() < 0.0;
@@ -310,7 +380,12 @@ impl Walk<'_> {
             indices.as_chunks_mut::<3>().0.iter_mut().for_each(|t| t.swap(1, 2));
         }
         let normal_texture = primitive.material().normal_texture();
-        let set = normal_texture.as_ref().map_or(0, gltf::material::NormalTexture::tex_coord);
+        let material = primitive.material();
+        let base = material.pbr_metallic_roughness().base_color_texture();
+        let set = match &normal_texture {
+            Some(normal) => normal.tex_coord(),
+            None => base.map_or(0, |base| base.tex_coord()),
+        };
         let place = |uv: [f32; 2]| match normal_texture.as_ref().and_then(normal_transform) {
             Some((offset, rotation, scale)) => {
                 // KHR_texture_transform: scale, then rotate counter-clockwise as seen with v down, then move.
@@ -321,15 +396,15 @@ impl Walk<'_> {
             None => uv.into(),
         };
         let sign = if mirrored { -1.0 } else { 1.0 };
+        let normals: Vec<Vec3> =
+            reader.read_normals().map(|n| n.map(|n| lasting * Vec3::from(n)).collect()).unwrap_or_default();
+        // Tangents without normals belong to normals that are not there, and are made anew with them.
+        let tangents = reader.read_tangents().filter(|_| !normals.is_empty());
         Ok(RawMesh {
             positions,
-            normals: reader
-                .read_normals()
-                .map(|n| n.map(|n| lasting * Vec3::from(n)).collect())
-                .unwrap_or_default(),
+            normals,
             uvs: reader.read_tex_coords(set).map(|uv| uv.into_f32().map(place).collect()).unwrap_or_default(),
-            tangents: reader
-                .read_tangents()
+            tangents: tangents
                 .map(|t| {
                     let turned = |t: [f32; 4]| {
                         let t = Vec4::from(t);

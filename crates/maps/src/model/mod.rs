@@ -62,7 +62,7 @@ struct RawMesh {
     triangles: Vec<[u32; 3]>,
 }
 
-/// Vertices and triangles that a model may have, in all.
+/// Vertices, and triangles, that a mesh may have.
 const MAX_ELEMENTS: usize = 1 << 26;
 
 fn format_of(path: &Path) -> Option<&'static ModelFormat> {
@@ -120,10 +120,19 @@ fn scene_of(
     if parts.materials.is_empty() {
         parts.materials.push(plain());
     }
+    // The first material is that of the first mesh, for whoever changes it later.
+    let first = parts.meshes[0].1;
+    parts.materials.swap(0, first);
+    for (_, material) in &mut parts.meshes {
+        *material = match *material {
+            0 => first,
+            m if m == first => 0,
+            m => m,
+        };
+    }
     if let Some(map) = &options.staging.map {
-        let first = parts.meshes[0].1;
-        parts.materials[first].surface = Arc::clone(map);
-        if parts.materials[first].finish_map.take().is_some() {
+        parts.materials[0].surface = Arc::clone(map);
+        if parts.materials[0].finish_map.take().is_some() {
             warnings.push(
                 "its first material's textures go with its own normal map, and are left out".to_owned(),
             );
@@ -154,7 +163,7 @@ fn scene_of(
     Ok(scene)
 }
 
-/// A flat map of one texel.
+/// A flat map.
 fn flat(size: Size) -> Arc<dyn Surface> {
     Arc::new(NormalGrid { normals: Grid::from_fn(size, |_, _| Vec3::Z), wraps: Wraps::default() })
 }

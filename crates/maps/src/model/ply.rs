@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{DefaultElement, Property};
 
-use super::{ModelFormat, Parts, RawMesh};
+use super::{MAX_ELEMENTS, ModelFormat, Parts, RawMesh};
 use crate::MapError;
 
 pub(super) const FORMAT: ModelFormat = ModelFormat { name: "PLY", extensions: &["ply"], read };
@@ -17,6 +17,9 @@ fn read(path: &Path, bytes: &[u8], _warnings: &mut Vec<String>) -> Result<Parts,
     // An element takes a byte at least, whatever the header says.
     if header.elements.iter().any(|(_, e)| e.count > bytes.len()) {
         return Err(MapError::invalid(path, "announces more elements than the file can hold"));
+    }
+    if header.elements.iter().any(|(_, e)| e.count > MAX_ELEMENTS) {
+        return Err(MapError::unsupported(path, format!("has more than {MAX_ELEMENTS} vertices or faces")));
     }
     let ply = parser.read_ply(&mut &bytes[..]).map_err(|e| MapError::invalid(path, e))?;
     let elements = |name: &str| ply.payload.get(name).map_or(&[][..], Vec::as_slice);

@@ -123,7 +123,7 @@ fn wraps(text: &str) -> Result<Wraps, String> {
     }
 }
 
-/// Largest side of a built-in map.
+/// Largest side of a built-in map, and of a picture.
 const MAX_BUILTIN: usize = 8192;
 
 pub(super) fn size(text: &str) -> Result<Size, String> {

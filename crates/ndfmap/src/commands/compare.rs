@@ -16,7 +16,7 @@ use super::arguments::{
     BuiltinSize, Precision, SourceArguments, brdf_spelling, brdfs_help, method, method_spelling,
     methods_help, scene_name, size,
 };
-use super::render::FilterArguments;
+use super::render::{FilterArguments, check_drift};
 use super::{print, print_json, say_if_replaced, warn};
 use crate::Failure;
 use crate::imaging::{Reel, Shot, shoot};
@@ -79,6 +79,9 @@ impl Compare {
             if methods.iter().all(|m| m.spelling() != method.spelling()) {
                 methods.push(method);
             }
+        }
+        if self.sparkle {
+            check_drift(self.picture)?;
         }
         let map = read_source(&self.map, &self.source.options(self.builtin.size))?;
         for warning in &map.warnings {

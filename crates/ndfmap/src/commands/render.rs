@@ -74,16 +74,16 @@ pub(super) struct Render {
     /// A light in place of the scene's: the direction to it X,Y,Z, or `point:X,Y,Z`, and perhaps :R,G,B. May be repeated
     #[arg(long, value_name = "LIGHT", value_parser = light, allow_hyphen_values = true)]
     light: Vec<Light>,
-    /// A reflectance lobe in place of the materials' own; where a material has a gloss map, that still widens it
+    /// A reflectance lobe in place of the materials' own; where a material has gloss of its own, that still widens it
     #[arg(long, value_parser = brdf_spelling)]
     brdf: Option<String>,
-    /// What goes with the lobe: Tan et al.'s, Han et al.'s or Smith's factor
-    #[arg(long, value_enum)]
-    model: Option<ModelArgument>,
-    /// Diffuse albedo R,G,B of the first material, in place of its own and of its textures
+    /// What goes with the lobe: the factor of Tan et al., of Han et al. or of Smith (tan, han, smith)
+    #[arg(long, value_parser = model)]
+    model: Option<Model>,
+    /// Diffuse albedo R,G,B of the first material, in place of its own; its textures go
     #[arg(long, value_name = "R,G,B", value_parser = colour)]
     diffuse: Option<DVec3>,
-    /// Reflectance R,G,B at normal incidence of the first material, in place of its own and of its textures
+    /// Reflectance R,G,B at normal incidence of the first material, in place of its own; its textures go
     #[arg(long, value_name = "R,G,B", value_parser = colour)]
     specular: Option<DVec3>,
     #[command(flatten)]
@@ -109,16 +109,16 @@ pub(super) struct Render {
 pub(super) struct FilterArguments {
     /// `trilinear`; `anisotropic:N`, with up to N taps along the longer axis, as texture units do; or `fine:N`, the same
     /// in four times the taps at a level one finer, nearer to the pixel's square
-    #[arg(long, value_name = "FILTER", default_value = "fine:16", value_parser = filter)]
+    #[arg(long, value_name = "FILTER", default_value = "fine:16", value_parser = filter, requires = "scene")]
     filter: Filtering,
     /// Levels to add to what the filter asks for; negative is sharper
-    #[arg(long, value_name = "LEVELS", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
+    #[arg(long, value_name = "LEVELS", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, requires = "scene")]
     lod_bias: f64,
     /// Shade every texel that the filter reads and mix the results, for lobes that are not aligned
-    #[arg(long)]
+    #[arg(long, requires = "scene")]
     neighbours: bool,
     /// Take cosines at the lobes' means, as the papers print them
-    #[arg(long)]
+    #[arg(long, requires = "scene")]
     at_means: bool,
 }
 
@@ -133,13 +133,6 @@ impl FilterArguments {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum ModelArgument {
-    Tan,
-    Han,
-    Smith,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
 enum Device {
     /// The best there is: so far the processor
     Auto,
@@ -151,6 +144,11 @@ fn scenes_help() -> String {
     let rows =
         scene::TABLE.iter().map(|r| format!("  {:13} {}; over time, {}", r.name, r.summary, r.animation));
     format!("Scenes:\n{}", rows.collect::<Vec<_>>().join("\n"))
+}
+
+fn model(text: &str) -> Result<Model, String> {
+    let names = Model::ALL.map(Model::name).join(", ");
+    Model::ALL.into_iter().find(|m| m.name() == text).ok_or_else(|| format!("`{text}` is none of {names}"))
 }
 
 fn time(text: &str) -> Result<f64, String> {
@@ -235,6 +233,17 @@ pub(super) fn filter(text: &str) -> Result<Filtering, String> {
 /// Most pixels of a contact sheet.
 const MAX_SHEET: usize = 1 << 27;
 
+/// Most pixels of a picture whose sparkle is measured: some ninety pictures of it are in memory at once.
+const MAX_DRIFT: usize = 1 << 21;
+
+/// Checks that sparkle can be measured at a size.
+pub(super) fn check_drift(size: Size) -> Result<(), Failure> {
+    if size.area() > MAX_DRIFT {
+        return Err(Failure::Usage(format!("sparkle is measured in pictures of at most {MAX_DRIFT} pixels")));
+    }
+    Ok(())
+}
+
 /// Checks that a picture can be written under this name.
 fn checked(path: &Path) -> Result<(), Failure> {
     match PictureFormat::of(path) {
@@ -258,6 +267,9 @@ impl Render {
             if methods.iter().all(|m| m.spelling() != method.spelling()) {
                 methods.push(method);
             }
+        }
+        if self.sparkle {
+            check_drift(self.size)?;
         }
         let stage = self.stage()?;
         let times = match self.frames {
@@ -321,11 +333,7 @@ impl Render {
             map,
             map_size: self.map_size,
             brdf: self.brdf.clone(),
-            model: self.model.map(|model| match model {
-                ModelArgument::Tan => Model::Tan,
-                ModelArgument::Han => Model::Han,
-                ModelArgument::Smith => Model::Smith,
-            }),
+            model: self.model,
             camera: self.camera,
             lights: self.light.clone(),
             diffuse: self.diffuse,

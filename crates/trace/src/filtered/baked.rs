@@ -5,11 +5,9 @@ use ndfmap_core::bake::Bake;
 use ndfmap_core::fit::{Four, LobeKind};
 use ndfmap_core::grid::Grid;
 use ndfmap_core::lookup::{Lookup, PixelFootprint, Texels};
-use ndfmap_core::ndf::{Filtered, Lit, Method, Prepared};
+use ndfmap_core::ndf::{FilteredTexel, Lit, Method, Prepared};
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::reflection::Finish;
-use ndfmap_core::scene::Material;
-use ndfmap_core::units::SlopeVariance;
+use ndfmap_core::scene::{FinishMap, Material};
 
 use super::Lookups;
 
@@ -99,26 +97,20 @@ impl Baked {
                     let from = 4 * ((k + 1) * self.layers + layer);
                     channels.get(from..from + 4).map(|c| [0, 1, 2, 3].map(|i| c[i] / weight))
                 };
-                finish_of(material, attribute(0).unwrap_or_default(), attribute(1))
+                FinishMap::finish(attribute(0).unwrap_or_default(), attribute(1), material.finish.specular)
             }
-            (Some(_), _) => finish_of(material, colours[0], (self.finish.len() > 1).then_some(colours[1])),
+            (Some(_), _) => FinishMap::finish(
+                colours[0],
+                (self.finish.len() > 1).then_some(colours[1]),
+                material.finish.specular,
+            ),
         };
-        let texel = Filtered {
+        let texel = FilteredTexel {
             channels: &channels[..4 * self.layers],
             finish: &finish,
             prepared: shading.prepared,
             at_means: lookups.at_means,
         };
         shading.method.reflect(&texel, &material.reflection, lights)
-    }
-}
-
-/// A finish from its channels.
-fn finish_of(material: &Material, [r, g, b, gloss]: [f32; 4], specular: Option<[f32; 4]>) -> Finish {
-    let colour = |[r, g, b]: [f32; 3]| DVec3::new(r.into(), g.into(), b.into());
-    Finish {
-        diffuse: colour([r, g, b]),
-        specular: specular.map_or(material.finish.specular, |[r, g, b, _]| colour([r, g, b])),
-        gloss: SlopeVariance::clamped(gloss.into()),
     }
 }

@@ -1,6 +1,6 @@
 //! Shading through a representation: one look-up a pixel, as wide as the pixel's reach on the map.
 //!
-//! Where outlines cross a pixel, and only there, it is cut into 4 × 4 parts that are shaded apart, each at its own reach,
+//! Where the pixels around a pixel show another surface than its own, it is cut into 4 × 4 parts that are shaded apart, each at its own reach,
 //! as a rasteriser's multisampling would have it: what is measured is the filtering of maps, not of outlines.
 
 mod baked;

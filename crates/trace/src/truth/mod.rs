@@ -10,10 +10,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::{DVec2, DVec3, Vec3};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::metrics::{Picture, relative_l2};
-use ndfmap_core::reflection::Finish;
 use ndfmap_core::scene::{Camera, Material, Rays, Scene};
 use ndfmap_core::surface::{SurfaceRow, Wraps};
-use ndfmap_core::units::SlopeVariance;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
@@ -198,23 +196,13 @@ impl<'a> Truth<'a> {
             wraps.y.index(at.y.floor() as isize, size.height),
         );
         let n = normals.row(y)[x].as_dvec3();
-        let finish = finish_at(material, x, y);
+        let own = material.finish;
+        let finish = material.finish_map.as_ref().map_or(own, |map| map.at(x, y, own.specular));
         let wo = place.frame.transpose() * eye;
         ways(&self.scene.lights, (place.position, place.frame), wo)
             .map(|(way, irradiance)| irradiance * material.reflection.facet(n, &finish, &way))
             .sum()
     }
-}
-
-/// What a texel of a material is made of.
-fn finish_at(material: &Material, x: usize, y: usize) -> Finish {
-    let Some(map) = &material.finish_map else { return material.finish };
-    let [r, g, b, gloss] = map.diffuse_gloss.row(y)[x].map(f64::from);
-    let specular = map.specular.as_ref().map_or(material.finish.specular, |map| {
-        let [r, g, b, _] = map.row(y)[x].map(f64::from);
-        DVec3::new(r, g, b)
-    });
-    Finish { diffuse: DVec3::new(r, g, b), specular, gloss: SlopeVariance::clamped(gloss) }
 }
 
 /// One seed of several numbers (the finaliser of SplitMix64, Steele et al. 2014, over a running sum).
