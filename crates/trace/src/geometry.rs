@@ -42,9 +42,9 @@ pub struct Hit {
 pub struct Place {
     /// In the world.
     pub position: DVec3,
-    /// Tangent, bitangent and normal of the base surface, orthonormal, as columns; the normal faces as the mesh does.
+    /// Tangent, bitangent and normal of the base surface, orthonormal, as columns; the normal faces the eye.
     pub frame: DMat3,
-    /// Unit normal of the triangle itself.
+    /// Unit normal of the triangle itself, towards the eye.
     pub face: DVec3,
     /// On the map, v down the rows.
     pub uv: DVec2,
@@ -116,15 +116,26 @@ impl Geometry {
         nearest
     }
 
-    /// What lies where a ray hit.
+    /// What lies where a ray of this direction hit.
+    ///
+    /// Seen from behind, a surface shows its back, frame turned about the tangent. Where the normal between corners has turned
+    /// away from an eye that the triangle itself faces, it is bent back until it just does not: else there would be holes.
     #[must_use]
-    pub fn place(&self, hit: &Hit) -> Place {
+    pub fn place(&self, hit: &Hit, direction: DVec3) -> Place {
         let Triangle { corners: [a, b, c], object, material } = &self.triangles[hit.triangle as usize];
         let DVec2 { x: s, y: t } = hit.barycentric;
         let r = 1.0 - s - t;
         let mix = |f: fn(&Vertex) -> DVec3| f(a) * r + f(b) * s + f(c) * t;
         let face = face(&[*a, *b, *c]);
-        let normal = mix(|v| v.normal.as_dvec3()).normalize_or(face);
+        let side = if face.dot(direction) > 0.0 { -1.0 } else { 1.0 };
+        let face = face * side;
+        let normal = mix(|v| v.normal.as_dvec3()).normalize_or(face) * side;
+        let facing = -normal.dot(direction);
+        let normal = if facing < LEAST_FACING {
+            (normal - direction * (LEAST_FACING - facing)).normalize()
+        } else {
+            normal
+        };
         let tangent = mix(|v| v.tangent.truncate().as_dvec3()).reject_from_normalized(normal);
         let tangent = tangent.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
         let bitangent = normal.cross(tangent) * f64::from(a.tangent.w);
@@ -154,6 +165,9 @@ impl Geometry {
         })
     }
 }
+
+/// Least cosine between a place's normal and the eye.
+const LEAST_FACING: f64 = 1e-3;
 
 /// Unit normal of a triangle; up for one without area.
 fn face([a, b, c]: &[Vertex; 3]) -> DVec3 {

@@ -348,3 +348,22 @@ fn scenes_far_from_everything_have_no_holes() {
         assert!(geometry.hit(rays.eye, rays.direction(at)).is_some(), "{at}");
     }
 }
+
+#[test]
+fn a_surface_shows_its_back() {
+    // A diffuse plate between light and eye is lit on the side that the eye does not see, and one seen from behind is lit there.
+    let mut scene = plate(map("v-groove", 16), "lambert", Model::Han, 1e6);
+    let one = Size { width: 1, height: 1 };
+    let front = truth(&scene, one, 1, 0).picture.texels()[0];
+    scene.camera = Camera::new([0.0, 0.0, -1e6], [0.0; 3], scene.camera.degrees);
+    assert_eq!(truth(&scene, one, 1, 0).picture.texels()[0], Vec3::ZERO);
+    let Light::Directional { towards, .. } = &mut scene.lights[0] else {
+        unreachable!("the plate has a sun")
+    };
+    towards.z = -towards.z;
+    let back = truth(&scene, one, 1, 0).picture.texels()[0];
+    // Grooves are alike from both sides, but for the numbers that rays take.
+    assert!((back - front).length() < 0.2 * front.length(), "{back} {front}");
+    let seen = filtered(&scene, "vmf:2", one, Lookups::TRILINEAR).texels()[0];
+    assert!((seen - front).length() < 0.2 * front.length(), "{seen} {front}");
+}

@@ -137,8 +137,9 @@ impl Filtered<'_> {
     }
 
     fn look(&self, rays: &Rays, at: DVec2) -> Option<(Hit, Place)> {
-        let hit = self.geometry.hit(rays.eye, rays.direction(at))?;
-        Some((hit, self.geometry.place(&hit)))
+        let direction = rays.direction(at);
+        let hit = self.geometry.hit(rays.eye, direction)?;
+        Some((hit, self.geometry.place(&hit, direction)))
     }
 
     /// A pixel as the mean of its parts.

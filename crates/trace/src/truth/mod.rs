@@ -181,7 +181,9 @@ impl<'a> Truth<'a> {
         let [u, v, s, t]: [f64; 4] = random.random();
         let direction = rays.direction(corner + DVec2::new(u, v) * width);
         match self.geometry.hit(rays.eye, direction) {
-            Some(hit) => self.shade(&self.geometry.place(&hit), -direction, DVec2::new(s, t) - 0.5),
+            Some(hit) => {
+                self.shade(&self.geometry.place(&hit, direction), -direction, DVec2::new(s, t) - 0.5)
+            }
             None => self.scene.background.as_dvec3(),
         }
     }
