@@ -233,6 +233,23 @@ pub struct Lookup {
     levels: Vec<Vec<f32>>,
 }
 
+/// Mean of what lies under texel (x, y) of a grid of another size over the same map: area by area, or where that grid is the
+/// finer, of the texels it lies in.
+#[must_use]
+pub fn area_mean(values: &Grid<[f32; 4]>, size: Size, x: usize, y: usize) -> [f32; 4] {
+    let fine = values.size();
+    let (columns, column) = footprint(fine.width, size.width, x);
+    let (rows, row) = footprint(fine.height, size.height, y);
+    let mut sum = [0.0; 4];
+    for r in rows {
+        for c in columns.clone() {
+            let weight = (row(r) * column(c)) as f32;
+            sum.iter_mut().zip(values.row(r)[c]).for_each(|(s, v)| *s += weight * v);
+        }
+    }
+    sum
+}
+
 impl Lookup {
     /// Unpacks a stored pyramid.
     #[must_use]
@@ -264,21 +281,9 @@ impl Lookup {
     /// Area means of plain values at every level.
     #[must_use]
     pub fn of_values(values: &Grid<[f32; 4]>, wraps: Wraps) -> Self {
-        let fine = values.size();
-        let sizes = level_sizes(fine);
+        let sizes = level_sizes(values.size());
         let level = |size: &Size| {
-            let mean = |i: usize| {
-                let (columns, column) = footprint(fine.width, size.width, i % size.width);
-                let (rows, row) = footprint(fine.height, size.height, i / size.width);
-                let mut sum = [0.0; 4];
-                for y in rows {
-                    for x in columns.clone() {
-                        let weight = (row(y) * column(x)) as f32;
-                        sum.iter_mut().zip(values.row(y)[x]).for_each(|(s, v)| *s += weight * v);
-                    }
-                }
-                sum
-            };
+            let mean = |i: usize| area_mean(values, *size, i % size.width, i / size.width);
             let texels: Vec<[f32; 4]> = (0..size.area()).into_par_iter().map(mean).collect();
             texels.into_flattened()
         };

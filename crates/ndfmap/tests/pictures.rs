@@ -22,7 +22,8 @@ fn colour(methods: &Value, method: &str) -> f64 {
 #[test]
 fn colour_errors_are_below_the_papers() {
     // Tan et al. 2005, section 5: 0.060 for the disk, 0.041 for it at an oblique angle, 0.058 for the armour; their truth
-    // had 16 rays a pixel. Below, on our own disk and armour, and in order: gmm before what it was published against.
+    // had 16 rays a pixel. And lobes are ahead of what they were published against: ratios of 0.29 to 0.66 with 256 rays (docs/scenes.md), to
+    // which this truth's noise, common to both, adds some.
     for (scene, time, paper, against) in [
         ("disk", "0.15", 0.060, "toksvig"),
         ("disk-oblique", "0", 0.041, "fixed"),

@@ -93,11 +93,8 @@ impl Mesh {
 
     /// Sets normals to the area-weighted mean of the triangles around each vertex, and tangents across them.
     pub fn smooth(&mut self) {
-        let mut sums = vec![Vec3::ZERO; self.vertices.len()];
-        for t in &self.triangles {
-            let [a, b, c] = t.map(|i| self.vertices[i as usize].position);
-            t.iter().for_each(|i| sums[*i as usize] += (b - a).cross(c - a));
-        }
+        let places: Vec<Vec3> = self.vertices.iter().map(|v| v.position).collect();
+        let sums = area_normals(&places, &self.triangles);
         for (vertex, sum) in self.vertices.iter_mut().zip(sums) {
             vertex.normal = sum.try_normalize().unwrap_or(vertex.normal);
             let tangent = vertex.tangent.truncate().reject_from_normalized(vertex.normal);
@@ -105,6 +102,17 @@ impl Mesh {
             vertex.tangent = tangent.extend(vertex.tangent.w);
         }
     }
+}
+
+/// Sum around each vertex of its triangles' normals, each twice as long as its triangle is large; not normalised.
+#[must_use]
+pub fn area_normals(places: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
+    let mut sums = vec![Vec3::ZERO; places.len()];
+    for t in triangles {
+        let [a, b, c] = t.map(|i| places[i as usize]);
+        t.iter().for_each(|i| sums[*i as usize] += (b - a).cross(c - a));
+    }
+    sums
 }
 
 /// Two triangles for each cell of a grid of corners, rows of `columns + 1`.

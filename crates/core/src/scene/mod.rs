@@ -18,7 +18,7 @@ mod v_groove;
 
 pub use camera::{Camera, Rays};
 pub use material::{FinishMap, Material};
-pub use mesh::{Mesh, Vertex};
+pub use mesh::{Mesh, Vertex, area_normals};
 
 use std::sync::Arc;
 

@@ -13,7 +13,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use glam::{DVec3, Mat3, Mat4, Vec2, Vec3, Vec4};
 use ndfmap_core::grid::{Grid, Size};
-use ndfmap_core::pyramid::footprint;
+use ndfmap_core::lookup::area_mean;
 use ndfmap_core::reflection::Finish;
 use ndfmap_core::scene::{FinishMap, Material};
 use ndfmap_core::surface::{Surface, SurfaceRow, Wrap, Wraps, unit_or_up};
@@ -237,20 +237,8 @@ impl Files<'_> {
             });
         }
         let size = surface.size();
-        // The mean of what lies under a texel of the normal map, or where that is finer, the texel it lies in.
         let sample = |map: &Option<Grid<[f32; 4]>>, x: usize, y: usize| {
-            let Some(map) = map else { return [1.0; 4] };
-            let from = map.size();
-            let (columns, column) = footprint(from.width, size.width, x);
-            let (rows, row) = footprint(from.height, size.height, y);
-            let mut sum = [0.0; 4];
-            for r in rows {
-                for c in columns.clone() {
-                    let weight = (row(r) * column(c)) as f32;
-                    sum.iter_mut().zip(map.row(r)[c]).for_each(|(s, v)| *s += weight * v);
-                }
-            }
-            sum
+            map.as_ref().map_or([1.0; 4], |map| area_mean(map, size, x, y))
         };
         let at = |x: usize, y: usize| factors.finish(sample(&base, x, y), sample(&metal_rough, x, y)).0;
         let rgb = |c: DVec3, w: f64| [c.x as f32, c.y as f32, c.z as f32, w as f32];

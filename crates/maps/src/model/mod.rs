@@ -17,7 +17,7 @@ use ndfmap_core::brdf::{Brdf, Ggx};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
 use ndfmap_core::reflection::{Finish, Model, Reflection};
-use ndfmap_core::scene::{Camera, Material, Mesh, Object, Scene, Staging, Vertex};
+use ndfmap_core::scene::{Camera, Material, Mesh, Object, Scene, Staging, Vertex, area_normals};
 use ndfmap_core::surface::{NormalGrid, Surface, Wraps};
 use ndfmap_core::units::{Alpha, SlopeVariance};
 
@@ -219,7 +219,8 @@ impl RawMesh {
             }
         }
         if self.normals.is_empty() {
-            self.normals = smooth_normals(&self);
+            // Made unit vectors below, with those that files have.
+            self.normals = area_normals(&self.positions, &self.triangles);
         }
         if self.uvs.is_empty() {
             warnings.push("has no map coordinates: its map is laid on along the three axes".to_owned());
@@ -246,16 +247,6 @@ impl RawMesh {
 /// The unit vector nearest to `tangent` that is perpendicular to the normal.
 fn across(tangent: Vec3, normal: Vec3) -> Vec3 {
     tangent.reject_from_normalized(normal).try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector())
-}
-
-/// Area-weighted mean of the triangles around each vertex.
-fn smooth_normals(mesh: &RawMesh) -> Vec<Vec3> {
-    let mut sums = vec![Vec3::ZERO; mesh.positions.len()];
-    for t in &mesh.triangles {
-        let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
-        t.iter().for_each(|i| sums[*i as usize] += (b - a).cross(c - a));
-    }
-    sums.into_iter().map(|n| n.try_normalize().unwrap_or(Vec3::Y)).collect()
 }
 
 /// MikkTSpace's view of a mesh: every corner of a triangle by itself.
