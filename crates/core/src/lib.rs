@@ -40,6 +40,7 @@ pub mod procedural;
 pub mod pyramid;
 pub mod reflection;
 pub mod scene;
+pub mod shader;
 pub mod sphere;
 pub mod surface;
 pub mod units;

@@ -187,15 +187,18 @@ pub trait Texels {
         // Eigenvalues of J Jᵀ, whose ellipse is the image of the pixel's unit circle.
         let (a, b, c) = (dx.x * dx.x + dy.x * dy.x, dx.x * dx.y + dy.x * dy.y, dx.y * dx.y + dy.y * dy.y);
         let half = (a - c) / 2.0;
-        let (mean, spread) = ((a + c) / 2.0, (half * half + b * b).sqrt());
-        let (major, minor) = ((mean + spread).sqrt(), (mean - spread).max(0.0).sqrt());
+        let spread = (half * half + b * b).sqrt();
+        let major = ((a + c) / 2.0 + spread).sqrt();
+        // Their product is the square of det J.
+        let minor = if major > 0.0 { dx.perp_dot(dy).abs() / major } else { 0.0 };
         // The longer axis has twice the angle whose cosine and sine are these: halved by square roots, the larger first.
         let (cos2, sin2) = if spread > 0.0 { (half / spread, b / spread) } else { (1.0, 0.0) };
         let larger = ((1.0 + cos2.abs()) / 2.0).sqrt();
         let smaller = sin2 / (2.0 * larger);
         let axis = if cos2 >= 0.0 { DVec2::new(larger, smaller) } else { DVec2::new(smaller, larger) };
         let parts = filtering.parts.max(1) as f64;
-        let wanted = (major / minor.max(1.0)).ceil();
+        // A hundredth over is no reason for another tap: else a round pixel would have one or two by its last digit.
+        let wanted = (major / minor.max(1.0) - 0.01).ceil();
         let long = if wanted.is_finite() { wanted.clamp(1.0, filtering.max_taps.max(1) as f64) } else { 1.0 };
         let long = long * parts;
         let lod = (major / long).max(minor / parts).max(1.0).log2() + filtering.lod_bias;

@@ -40,6 +40,12 @@ impl Model {
         }
     }
 
+    /// Its number in shaders.
+    #[must_use]
+    pub fn index(self) -> u32 {
+        self as u32
+    }
+
     /// The Fresnel term: Schlick's, from the reflectance at normal incidence; for Han et al. that colour itself.
     #[must_use]
     pub fn fresnel(self, specular: DVec3, u: f64) -> DVec3 {

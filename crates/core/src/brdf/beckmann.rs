@@ -76,6 +76,14 @@ impl Brdf for Beckmann {
     fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64 {
         self.widened(by).evaluate(u)
     }
+
+    fn shader(&self) -> &'static str {
+        include_str!("beckmann.wgsl")
+    }
+
+    fn base(&self) -> f64 {
+        self.alpha_squared
+    }
 }
 
 #[cfg(test)]

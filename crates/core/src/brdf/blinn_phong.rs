@@ -69,6 +69,14 @@ impl Brdf for BlinnPhong {
         self.widened(by).evaluate(u)
     }
 
+    fn shader(&self) -> &'static str {
+        include_str!("blinn_phong.wgsl")
+    }
+
+    fn base(&self) -> f64 {
+        self.exponent.get()
+    }
+
     fn zonal(&self, order: usize) -> Vec<f64> {
         let s = self.exponent.get();
         // Times 2 pi and the lobe's own scale: a_0 = 1, a_1 = (s+1)/(s+2).

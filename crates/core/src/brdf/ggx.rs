@@ -75,4 +75,12 @@ impl Brdf for Ggx {
     fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64 {
         self.widened(by).evaluate(u)
     }
+
+    fn shader(&self) -> &'static str {
+        include_str!("ggx.wgsl")
+    }
+
+    fn base(&self) -> f64 {
+        self.alpha_squared
+    }
 }

@@ -83,6 +83,14 @@ impl Brdf for Lambert {
         self.widened(by).evaluate(u)
     }
 
+    fn shader(&self) -> &'static str {
+        include_str!("diffuse_only.wgsl")
+    }
+
+    fn base(&self) -> f64 {
+        0.0
+    }
+
     fn zonal(&self, order: usize) -> Vec<f64> {
         if self.normals.get() > 0.0 {
             return super::zonal_by_quadrature(self, order);

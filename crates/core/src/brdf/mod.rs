@@ -68,6 +68,12 @@ pub trait Brdf: Send + Sync + Debug {
         zonal_by_quadrature(self, order)
     }
 
+    /// Text of the twin in WGSL: `SPECULAR` and the functions `brdf_widen`, `brdf_evaluate`, `brdf_variance`, `brdf_masking`.
+    fn shader(&self) -> &'static str;
+
+    /// The one number, `base`, that the twin's functions take for this lobe.
+    fn base(&self) -> f64;
+
     /// The approximation that Han et al. print for the zonal coefficients, if they do.
     fn zonal_as_printed(&self, _order: usize) -> Option<Vec<f64>> {
         None

@@ -68,6 +68,14 @@ impl Brdf for TorranceSparrow {
         self.widened(by).evaluate(u)
     }
 
+    fn shader(&self) -> &'static str {
+        include_str!("torrance_sparrow.wgsl")
+    }
+
+    fn base(&self) -> f64 {
+        self.sigma_squared
+    }
+
     fn zonal_as_printed(&self, order: usize) -> Option<Vec<f64>> {
         Some((0..=order).map(|l| (-self.sigma_squared * (l * l) as f64).exp()).collect())
     }

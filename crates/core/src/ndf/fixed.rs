@@ -10,6 +10,7 @@ use super::mixture::{Cosine, Shaded, cosine};
 use super::naive::UnitMean;
 use super::{Representation, Row, Sample, no_parameters};
 use crate::brdf::Brdf;
+use crate::shader::Shader;
 
 /// The do-nothing baseline.
 #[derive(Clone, Copy, Debug)]
@@ -67,6 +68,14 @@ impl Representation for Fixed {
 
     fn effective<'a>(&'a self, lobes: &UnitMean, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         lobes.effective(brdf)
+    }
+
+    fn shader(&self) -> Shader {
+        Shader::new(&[
+            include_str!("fixed.wgsl"),
+            include_str!("sphere_cosine.wgsl"),
+            include_str!("mixture.wgsl"),
+        ])
     }
 
     fn isotropic(&self, lobes: &UnitMean) -> Option<(Cosine, Vec<Shaded>)> {

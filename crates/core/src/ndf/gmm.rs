@@ -12,6 +12,7 @@ use super::mixture::{Cosine, Lobes, MixtureEvaluator, Shaded, effective, mean_of
 use super::{Decoded, Evaluator, Method, PlanarLobe, Representation, Row, Sample};
 use crate::brdf::Brdf;
 use crate::fit::{Fit, Four, LobeKind};
+use crate::shader::Shader;
 use crate::units::SlopeVariance;
 
 /// Planar Gaussian lobes.
@@ -134,6 +135,11 @@ impl Representation for Gmm {
         brdf: &'a dyn Brdf,
     ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         effective(&lobes.lobes, brdf, planar_cosine)
+    }
+
+    fn shader(&self) -> Shader {
+        Shader::new(&[include_str!("gmm.wgsl"), include_str!("mixture.wgsl")])
+            .constant("PRINTED", self.printed)
     }
 
     fn isotropic(&self, lobes: &GaussianMixture) -> Option<(Cosine, Vec<Shaded>)> {

@@ -41,6 +41,7 @@ use glam::{DMat3, DVec2, DVec3, Vec3};
 use crate::brdf::{Brdf, Lambert};
 use crate::fit::{Fit, Four};
 use crate::reflection::Reflection;
+use crate::shader::Shader;
 use crate::surface::SurfaceRow;
 use crate::units::SlopeVariance;
 
@@ -114,6 +115,9 @@ pub trait Representation: Debug + Send + Sync {
     fn isotropic(&self, _lobes: &Self::Lobes) -> Option<(Cosine, Vec<Shaded>)> {
         None
     }
+
+    /// The twin of decoding and shading, in WGSL.
+    fn shader(&self) -> Shader;
 
     /// Sets channels that are computed from the filtered sums and are no sums themselves.
     fn finish(&self, _channels: &mut [f32]) {}
@@ -286,6 +290,9 @@ pub trait Method: Debug + Send + Sync {
     /// The light that a texel with these filtered channels sends to the eye; see [`FilteredTexel`].
     fn reflect(&self, texel: &FilteredTexel<'_>, reflection: &Reflection, lights: &[Lit]) -> DVec3;
 
+    /// The twin of decoding and shading, in WGSL; see `crates/core/src/shader.rs` for how it is linked.
+    fn shader(&self) -> Shader;
+
     /// What it makes of a flat map.
     fn flat_lobe(&self, brdf: &dyn Brdf) -> FlatLobe;
 
@@ -350,6 +357,10 @@ impl<R: Representation> Method for R {
 
     fn reflect(&self, texel: &FilteredTexel<'_>, reflection: &Reflection, lights: &[Lit]) -> DVec3 {
         reflect::reflect(self, texel, reflection, lights)
+    }
+
+    fn shader(&self) -> Shader {
+        Representation::shader(self)
     }
 
     fn flat_lobe(&self, brdf: &dyn Brdf) -> FlatLobe {

@@ -8,6 +8,7 @@ use glam::{DVec3, Vec3};
 use super::mixture::{Cosine, Shaded, cosine};
 use super::{Decoded, Representation, Row, Sample, direction_or_up, no_parameters};
 use crate::brdf::Brdf;
+use crate::shader::Shader;
 use crate::units::SlopeVariance;
 
 /// Normalised mip-mapping.
@@ -95,6 +96,14 @@ impl Representation for Naive {
 
     fn effective<'a>(&'a self, lobes: &UnitMean, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         lobes.effective(brdf)
+    }
+
+    fn shader(&self) -> Shader {
+        Shader::new(&[
+            include_str!("naive.wgsl"),
+            include_str!("sphere_cosine.wgsl"),
+            include_str!("mixture.wgsl"),
+        ])
     }
 
     fn isotropic(&self, lobes: &UnitMean) -> Option<(Cosine, Vec<Shaded>)> {

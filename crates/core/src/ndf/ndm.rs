@@ -18,6 +18,7 @@ use glam::{DMat3, DVec2, DVec3};
 use super::slopes::stretched;
 use super::{Decoded, FlatLobe, Method, Representation, Row, Sample, direction_or_up};
 use crate::brdf::{Brdf, mean_of_positive_part};
+use crate::shader::Shader;
 use crate::sphere::frame;
 use crate::units::SlopeVariance;
 
@@ -322,16 +323,35 @@ impl Representation for Ndm {
         lobes.mean
     }
 
+    fn shader(&self) -> Shader {
+        let sources = &[
+            include_str!("ndm.wgsl"),
+            include_str!("stretched.wgsl"),
+            include_str!("../sphere.wgsl"),
+            include_str!("whole.wgsl"),
+        ];
+        Shader::new(sources)
+            .constant("KERNEL", self.kernel as u32)
+            .constant("NORMALISATION", self.normalisation as u32)
+    }
+
+    /// The lobe's energy, which kernels of their own shape are scaled to.
+    fn table(&self, brdf: &dyn Brdf) -> Vec<f64> {
+        let own = self.kernel != Kernel::Brdf && brdf.slope_variance().is_some();
+        if own { brdf.zonal(0) } else { Vec::new() }
+    }
+
     fn effective<'a>(&'a self, lobes: &SpaceGaussian, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        let g = *lobes;
-        let Some(base) = brdf.slope_variance() else {
-            return Box::new(move |w| mean_of_positive_part(w.dot(g.mean), w.dot(g.covariance * w)));
-        };
-        if self.normalisation == Normalisation::Plane {
-            self.on_plane(g, brdf, base)
-        } else {
-            self.on_sphere(g, brdf, base)
-        }
+        self.effective_of(*lobes, brdf, self.table(brdf).first().copied())
+    }
+
+    fn effective_with<'a>(
+        &'a self,
+        lobes: &SpaceGaussian,
+        brdf: &'a dyn Brdf,
+        table: &'a [f64],
+    ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+        self.effective_of(*lobes, brdf, table.first().copied())
     }
 
     fn has_finish(&self) -> bool {
@@ -357,12 +377,31 @@ impl Representation for Ndm {
 }
 
 impl Ndm {
+    /// The effective lobe; `energy` is that of the BRDF, where the kernel is not its own.
+    fn effective_of<'a>(
+        self,
+        g: SpaceGaussian,
+        brdf: &'a dyn Brdf,
+        energy: Option<f64>,
+    ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+        let Some(base) = brdf.slope_variance() else {
+            return Box::new(move |w| mean_of_positive_part(w.dot(g.mean), w.dot(g.covariance * w)));
+        };
+        let energy = energy.unwrap_or(1.0);
+        if self.normalisation == Normalisation::Plane {
+            self.on_plane(g, brdf, base, energy)
+        } else {
+            self.on_sphere(g, brdf, base, energy)
+        }
+    }
+
     /// The density on the sphere.
     fn on_sphere<'a>(
         self,
         g: SpaceGaussian,
         brdf: &'a dyn Brdf,
         base: SlopeVariance,
+        energy: f64,
     ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         let v = base.get();
         let sigma = g.widened(v);
@@ -373,7 +412,7 @@ impl Ndm {
         match self.kernel {
             Kernel::Brdf => Box::new(move |w| scale * brdf.evaluate(1.0 - v * distance(w) / 2.0)),
             kernel => {
-                let scale = scale * brdf.zonal(0)[0] / kernel.flat_integral(v);
+                let scale = scale * energy / kernel.flat_integral(v);
                 Box::new(move |w| scale * kernel.generator(distance(w)))
             }
         }
@@ -385,6 +424,7 @@ impl Ndm {
         g: SpaceGaussian,
         brdf: &'a dyn Brdf,
         base: SlopeVariance,
+        energy: f64,
     ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         let (mu, a, b) = g.axes();
         let length = g.mean.length().clamp(1e-3, 1.0);
@@ -407,7 +447,7 @@ impl Ndm {
         let [aa, bb, ab] = covariance;
         let determinant = (aa * bb - ab * ab).max(f64::MIN_POSITIVE);
         let kernel = self.kernel;
-        let scale = brdf.zonal(0)[0] * length * length / (kernel.plane_integral() * determinant.sqrt());
+        let scale = energy * length * length / (kernel.plane_integral() * determinant.sqrt());
         Box::new(move |w| match place(w) {
             (u, d) if u > 0.0 => {
                 let d = d / u;

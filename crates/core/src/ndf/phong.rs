@@ -9,6 +9,7 @@ use super::mixture::{Cosine, Lobes, MixtureEvaluator, Shaded, cosine, effective,
 use super::{Decoded, Evaluator, Method, MixtureLobe, Representation, Row, Sample};
 use crate::brdf::Brdf;
 use crate::fit::{Alignment, Fit, Four, LobeKind, MAX_LOBES, SHARPEST};
+use crate::shader::Shader;
 use crate::units::SlopeVariance;
 
 /// Phong peaks.
@@ -119,6 +120,15 @@ impl Representation for Phong {
 
     fn effective<'a>(&'a self, peaks: &PhongPeaks, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         effective(&peaks.peaks, brdf, cosine)
+    }
+
+    fn shader(&self) -> Shader {
+        Shader::new(&[
+            include_str!("phong.wgsl"),
+            include_str!("sphere_cosine.wgsl"),
+            include_str!("mixture.wgsl"),
+        ])
+        .constant("SHARPEST", SHARPEST)
     }
 
     fn isotropic(&self, lobes: &PhongPeaks) -> Option<(Cosine, Vec<Shaded>)> {

@@ -10,6 +10,7 @@ use glam::DVec3;
 
 use super::{Decoded, Evaluator, FlatLobe, Method, Representation, Row, Sample};
 use crate::brdf::Brdf;
+use crate::shader::Shader;
 use crate::sphere::{MAX_SH_ORDER, sh_count, spherical_harmonics};
 
 /// Spherical harmonics up to an order.
@@ -153,6 +154,11 @@ impl Representation for Sh {
     ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         let lobes = *lobes;
         Box::new(move |w| clamped_dot(&self.weights(table, w), &lobes.gamma))
+    }
+
+    fn shader(&self) -> Shader {
+        let sources = &[include_str!("sh.wgsl"), include_str!("../sphere.wgsl"), include_str!("whole.wgsl")];
+        Shader { table: self.order + 1, ..Shader::new(sources).constant("ORDER", self.order as u32) }
     }
 
     fn effective<'a>(&'a self, lobes: &Coefficients, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {

@@ -14,6 +14,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 use super::{Decoded, Representation, Row, Sample, no_parameters};
 use crate::brdf::Brdf;
+use crate::shader::Shader;
 use crate::surface::{SurfaceRow, normal_of_slope, slope_of_normal};
 use crate::units::SlopeVariance;
 
@@ -188,6 +189,14 @@ impl Representation for Slopes {
     fn mean(&self, lobes: &SlopeGaussian) -> DVec3 {
         normal_of_slope(lobes.mean.as_vec2()).as_dvec3()
             / (1.0 + 0.5 * (lobes.covariance[0] + lobes.covariance[1]))
+    }
+
+    fn shader(&self) -> Shader {
+        Shader::new(&[
+            include_str!("slopes.wgsl"),
+            include_str!("stretched.wgsl"),
+            include_str!("whole.wgsl"),
+        ])
     }
 
     fn effective<'a>(&'a self, lobes: &SlopeGaussian, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {

@@ -9,6 +9,7 @@ use glam::{DVec3, Vec3};
 use super::mixture::{Cosine, Shaded, cosine};
 use super::{Decoded, Representation, Row, Sample, direction_or_up, no_parameters};
 use crate::brdf::Brdf;
+use crate::shader::Shader;
 use crate::units::SlopeVariance;
 
 /// One isotropic lobe from the length of the mean normal.
@@ -88,6 +89,14 @@ impl Representation for Toksvig {
     fn effective<'a>(&'a self, lobes: &Lobe, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         let (mu, widened) = (direction_or_up(lobes.mean), brdf.widen(lobes.variance));
         Box::new(move |w| widened.evaluate(w.dot(mu)))
+    }
+
+    fn shader(&self) -> Shader {
+        Shader::new(&[
+            include_str!("toksvig.wgsl"),
+            include_str!("sphere_cosine.wgsl"),
+            include_str!("mixture.wgsl"),
+        ])
     }
 
     fn isotropic(&self, lobes: &Lobe) -> Option<(Cosine, Vec<Shaded>)> {

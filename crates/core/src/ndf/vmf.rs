@@ -14,6 +14,7 @@ use super::mixture::{Cosine, Lobes, MixtureEvaluator, Shaded, cosine, effective,
 use super::{Decoded, Evaluator, Method, MixtureLobe, Representation, Row, Sample};
 use crate::brdf::Brdf;
 use crate::fit::{Fit, Four, LobeKind, from_pole};
+use crate::shader::Shader;
 use crate::units::SlopeVariance;
 
 /// Von Mises-Fisher lobes.
@@ -140,6 +141,15 @@ impl Representation for Vmf {
 
     fn effective<'a>(&'a self, lobes: &VmfMixture, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         effective(&lobes.lobes, brdf, cosine)
+    }
+
+    fn shader(&self) -> Shader {
+        Shader::new(&[
+            include_str!("vmf.wgsl"),
+            include_str!("sphere_cosine.wgsl"),
+            include_str!("mixture.wgsl"),
+        ])
+        .constant("ORIGIN", self.origin)
     }
 
     fn isotropic(&self, lobes: &VmfMixture) -> Option<(Cosine, Vec<Shaded>)> {

@@ -47,9 +47,12 @@ impl Camera {
 pub struct Rays {
     /// Where they start.
     pub eye: DVec3,
-    corner: DVec3,
-    right: DVec3,
-    down: DVec3,
+    /// To the picture's upper left corner, on the plane at distance 1.
+    pub corner: DVec3,
+    /// One pixel to the right there.
+    pub right: DVec3,
+    /// One pixel down there.
+    pub down: DVec3,
 }
 
 impl Rays {

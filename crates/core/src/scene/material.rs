@@ -26,6 +26,12 @@ impl FinishMap {
         Self::finish(of(&self.diffuse_gloss), self.specular.as_deref().map(of), specular)
     }
 
+    /// The maps one by one: albedo and gloss, and specular colour where it changes.
+    #[must_use]
+    pub fn grids(&self) -> Vec<Grid<[f32; 4]>> {
+        std::iter::once(&self.diffuse_gloss).chain(&self.specular).map(|map| (**map).clone()).collect()
+    }
+
     /// A finish from its channels, filtered or not.
     #[must_use]
     pub fn finish(diffuse_gloss: [f32; 4], mapped: Option<[f32; 4]>, specular: DVec3) -> Finish {

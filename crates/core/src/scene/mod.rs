@@ -4,6 +4,7 @@
 //! [`TABLE`] has one row for each built-in scene, and a row buys the tests at the end of this file.
 
 mod armour;
+mod baked;
 mod camera;
 mod cloth;
 mod creature;
@@ -16,6 +17,7 @@ mod plane;
 mod sphere;
 mod v_groove;
 
+pub use baked::BakedMaterial;
 pub use camera::{Camera, Rays};
 pub use material::{FinishMap, Material};
 pub use mesh::{Mesh, Vertex, area_normals};

@@ -1,13 +1,10 @@
 //! A baked material: look-ups of its map's channels and of what it is made of.
 
 use glam::DVec3;
-use ndfmap_core::bake::Bake;
-use ndfmap_core::fit::{Four, LobeKind};
-use ndfmap_core::grid::Grid;
 use ndfmap_core::lookup::{Lookup, PixelFootprint, Texels};
 use ndfmap_core::ndf::{FilteredTexel, Lit, Method, Prepared};
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{FinishMap, Material};
+use ndfmap_core::scene::{BakedMaterial, FinishMap, Material};
 
 use super::Lookups;
 
@@ -35,21 +32,12 @@ impl Baked {
         precision: Precision,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Self {
-        let surface = &*material.surface;
-        let bake = Bake { surface, method, precision, progress };
-        let carried: Vec<Grid<Four>> = match &material.finish_map {
-            Some(map) => {
-                std::iter::once(&map.diffuse_gloss).chain(&map.specular).map(|g| (**g).clone()).collect()
-            }
-            None => Vec::new(),
-        };
-        let fitted = method.fit().is_some_and(|fit| fit.kind != LobeKind::Peaks);
-        let (pyramid, _) = if fitted { bake.to_pyramid_with(&carried) } else { bake.to_pyramid() };
-        let finish = if fitted { &[][..] } else { &carried };
+        let baked = BakedMaterial::new(material, method, precision, progress);
+        let wraps = material.surface.wraps();
         Self {
-            map: Lookup::new(&pyramid),
+            map: Lookup::new(&baked.pyramid),
             layers: method.layers(),
-            finish: finish.iter().map(|values| Lookup::of_values(values, surface.wraps())).collect(),
+            finish: baked.finish.iter().map(|values| Lookup::of_values(values, wraps)).collect(),
         }
     }
 

@@ -1,0 +1,29 @@
+// Beckmann: D(u) = exp(-tan²/alpha²) / (pi alpha² u⁴). Twin of beckmann.rs; `base` is alpha².
+
+// True for a lobe around the half-vector.
+const SPECULAR: bool = true;
+
+// The lobe widened by a slope variance: alpha'² = alpha² + 2 v.
+fn brdf_widen(base: f32, by: f32) -> f32 {
+    return base + 2.0 * by;
+}
+
+// D(u), u the cosine between normal and half-vector.
+fn brdf_evaluate(base: f32, u: f32) -> f32 {
+    // Below, the exponential has underflowed for alpha up to 1, and u⁴ is about to for any.
+    if u <= 1e-6 {
+        return 0.0;
+    }
+    let u2 = min(u * u, 1.0);
+    return exp(-(1.0 - u2) / (u2 * base)) / (PI * base * u2 * u2);
+}
+
+// Slope variance on one axis.
+fn brdf_variance(base: f32) -> f32 {
+    return base / 2.0;
+}
+
+// Smith's masking at cosine `u > 0`, of a lobe of this kind that is `width` wide.
+fn brdf_masking(u: f32, width: f32) -> f32 {
+    return beckmann_masking(u, width);
+}

@@ -1,0 +1,20 @@
+// No highlight: what a diffuse material is linked with in place of a lobe around the half-vector.
+
+// False: the lobe is of the light's direction, and the diffuse part already.
+const SPECULAR: bool = false;
+
+fn brdf_widen(base: f32, by: f32) -> f32 {
+    return base;
+}
+
+fn brdf_evaluate(base: f32, u: f32) -> f32 {
+    return 0.0;
+}
+
+fn brdf_variance(base: f32) -> f32 {
+    return 0.0;
+}
+
+fn brdf_masking(u: f32, width: f32) -> f32 {
+    return 1.0;
+}

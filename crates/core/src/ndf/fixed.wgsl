@@ -1,0 +1,8 @@
+// The filtered n.xy, z rebuilt. Twin of fixed.rs.
+
+const NORMALISED: bool = false;
+
+fn decode_lobe(sums: vec4<f32>) -> Shaded {
+    let xy = sums.xy;
+    return Shaded(direction_or_up(vec3<f32>(xy, sqrt(max(1.0 - dot(xy, xy), 0.0)))), 1.0, 0.0);
+}

@@ -1,0 +1,63 @@
+// Shading methods whose texels are sums of isotropic lobes. Twin of `reflect` in reflect.rs, for those that have `isotropic`.
+//
+// A method brings `decode_lobe` (one layer to a lobe, of weight 0 where it says nothing), `cosine`, and NORMALISED.
+
+alias Decoded = array<Shaded, LAYERS>;
+
+// The lobes that a texel's channels stand for.
+fn decode(channels: ptr<function, Channels>) -> Decoded {
+    var lobes: Decoded;
+    var total = 0.0;
+    for (var j = 0u; j < LAYERS; j++) {
+        lobes[j] = decode_lobe((*channels)[j]);
+        total += lobes[j].weight;
+    }
+    if NORMALISED {
+        let share = select(0.0, 1.0 / total, total > 0.0);
+        for (var j = 0u; j < LAYERS; j++) {
+            lobes[j].weight *= share;
+        }
+    }
+    return lobes;
+}
+
+// The unit direction of a lobe's mean; a planar mean, whose z is 0, is lifted to the sphere.
+fn direction(lobe: Shaded) -> vec3<f32> {
+    let m = lobe.mean;
+    let z = select(m.z, sqrt(max(1.0 - m.x * m.x - m.y * m.y, 0.0)), m.z == 0.0);
+    return direction_or_up(vec3<f32>(m.xy, z));
+}
+
+// Light that a texel sends along the way, per unit of irradiance.
+fn reflect_texel(
+    channels: ptr<function, Channels>,
+    lobes: ptr<function, Decoded>,
+    plain: Finish,
+    reflection: Reflection,
+    way: Way,
+) -> vec3<f32> {
+    var sum = vec3<f32>(0.0);
+    for (var j = 0u; j < LAYERS; j++) {
+        let lobe = (*lobes)[j];
+        if lobe.weight == 0.0 {
+            continue;
+        }
+        let finish = finish_of(channels, j, plain);
+        let mu = direction(lobe);
+        var specular = 0.0;
+        if SPECULAR {
+            let widened = brdf_widen(reflection.base, lobe.variance + finish.gloss);
+            let f = brdf_evaluate(widened, cosine(way.wh, lobe.mean));
+            if f > 0.0 {
+                var n = mu;
+                if reflection.at_means == 0u {
+                    n = answering(lobe, mu, lobe_width(reflection, finish.gloss), way.wh);
+                }
+                specular = f * factor(reflection, n, way, finish.gloss);
+            }
+        }
+        let diffuse = lambert_evaluate(lobe.variance, dot(way.wi, mu));
+        sum += lobe.weight * together(reflection, finish, way, specular, diffuse);
+    }
+    return sum;
+}

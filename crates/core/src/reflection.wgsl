@@ -1,0 +1,102 @@
+// How a surface answers a light: a lobe, what multiplies it, and a diffuse part. Twin of reflection.rs.
+
+const PI: f32 = 3.14159265358979;
+
+// Models, as numbered by `Model::index`.
+const TAN: u32 = 0u;
+const HAN: u32 = 1u;
+const SMITH: u32 = 2u;
+
+// Least n·wo that Tan et al.'s model divides by.
+const LEAST_COSINE: f32 = 0.05;
+
+// A path from light to eye, in the tangent frame.
+struct Way {
+    // To the light.
+    wi: vec3<f32>,
+    // To the eye.
+    wo: vec3<f32>,
+    // Half-vector.
+    wh: vec3<f32>,
+    // wi · wh.
+    u: f32,
+}
+
+// What a place is made of, apart from its normals.
+struct Finish {
+    // Diffuse albedo, linear RGB.
+    diffuse: vec3<f32>,
+    // What widens the lobe here: a slope variance.
+    gloss: f32,
+    // Reflectance at normal incidence; linear RGB.
+    specular: vec3<f32>,
+}
+
+// A lobe in a model: everything about a material that does not change over its surface.
+struct Reflection {
+    // The lobe's own number; see its file.
+    base: f32,
+    // TAN, HAN or SMITH.
+    model: u32,
+    // 1: factors are taken at the lobes' means, as the papers print it.
+    at_means: u32,
+    // The gloss that `table` is made for.
+    gloss: f32,
+    // What the method wants to know of the lobe (x) and of the diffuse one (y).
+    table: array<vec4<f32>, TABLE>,
+}
+
+// The path between two unit vectors. Only where both are above the surface (z > 0) is anything reflected.
+fn way_between(wi: vec3<f32>, wo: vec3<f32>) -> Way {
+    let wh = normalize(wi + wo);
+    return Way(wi, wo, wh, dot(wi, wh));
+}
+
+// The Fresnel term: Schlick's; for Han et al. the colour itself.
+fn fresnel(model: u32, specular: vec3<f32>, u: f32) -> vec3<f32> {
+    if model == HAN {
+        return specular;
+    }
+    let x = clamp(1.0 - u, 0.0, 1.0);
+    let x2 = x * x;
+    return specular + (1.0 - specular) * (x2 * x2 * x);
+}
+
+// What is left for the diffuse part.
+fn diffuse_share(model: u32, fresnel: vec3<f32>) -> vec3<f32> {
+    return select(1.0 - fresnel, vec3<f32>(1.0), model == HAN);
+}
+
+// Slope variance of the lobe at a place.
+fn lobe_width(reflection: Reflection, gloss: f32) -> f32 {
+    return brdf_variance(reflection.base) + gloss;
+}
+
+// The factor c at a normal, for the lobe that the gloss makes.
+fn factor(reflection: Reflection, n: vec3<f32>, way: Way, gloss: f32) -> f32 {
+    let i = dot(n, way.wi);
+    let o = dot(n, way.wo);
+    if reflection.model == TAN {
+        return 1.0 / max(o, LEAST_COSINE);
+    }
+    if reflection.model == HAN {
+        return max(i, 0.0);
+    }
+    if i <= 0.0 || o <= 0.0 {
+        return 0.0;
+    }
+    let width = lobe_width(reflection, gloss);
+    return brdf_masking(i, width) * brdf_masking(o, width) / (4.0 * o);
+}
+
+// Light that one normal sends along the way, per unit of irradiance.
+fn facet(reflection: Reflection, n: vec3<f32>, finish: Finish, way: Way) -> vec3<f32> {
+    let lambert = finish.diffuse * (max(dot(n, way.wi), 0.0) / PI);
+    if !SPECULAR {
+        return lambert;
+    }
+    let f = fresnel(reflection.model, finish.specular, way.u);
+    let diffuse = diffuse_share(reflection.model, f) * lambert;
+    let lobe = brdf_evaluate(brdf_widen(reflection.base, finish.gloss), dot(n, way.wh));
+    return diffuse + f * (lobe * factor(reflection, n, way, finish.gloss));
+}

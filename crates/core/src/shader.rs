@@ -1,0 +1,104 @@
+//! Shaders: the text that shades a filtered texel, for one method and one lobe.
+//!
+//! Beside each Rust function that a shader needs lies its twin in WGSL, of the same name. Declarations in WGSL may stand in any
+//! order, so linking is concatenation: constants, what all shaders share, the lobe, the method. There are no bindings and no
+//! entry points in it; textures, samplers and parameters come as arguments.
+
+use std::fmt::Display;
+
+use crate::brdf::Brdf;
+use crate::ndf::Method;
+
+/// A method's own part of a shader.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shader {
+    /// Constants that its text refers to, as declarations.
+    pub constants: String,
+    /// Entries of the table that [`crate::ndf::Prepared::table`] makes.
+    pub table: usize,
+    /// Its text.
+    pub sources: &'static [&'static str],
+}
+
+impl Shader {
+    /// One without constants or a table.
+    #[must_use]
+    pub(crate) fn new(sources: &'static [&'static str]) -> Self {
+        Self { constants: String::new(), table: 1, sources }
+    }
+
+    /// Adds a constant.
+    #[must_use]
+    pub(crate) fn constant(mut self, name: &str, value: impl Constant) -> Self {
+        self.constants += &value.declare(name);
+        self
+    }
+}
+
+/// A value that WGSL has a type for.
+pub(crate) trait Constant: Display {
+    /// Name of the type.
+    const TYPE: &str;
+    /// What follows a number of this type.
+    const SUFFIX: &str;
+
+    /// The declaration.
+    fn declare(&self, name: &str) -> String {
+        format!("const {name}: {} = {self}{};\n", Self::TYPE, Self::SUFFIX)
+    }
+}
+
+impl Constant for bool {
+    const TYPE: &str = "bool";
+    const SUFFIX: &str = "";
+}
+
+impl Constant for u32 {
+    const TYPE: &str = "u32";
+    const SUFFIX: &str = "u";
+}
+
+impl Constant for f32 {
+    const TYPE: &str = "f32";
+    const SUFFIX: &str = "f";
+}
+
+/// What every shader has: [`crate::reflection`], [`crate::brdf`], [`crate::ndf`] in common.
+const SHARED: [&str; 4] = [
+    include_str!("reflection.wgsl"),
+    include_str!("brdf/lambert.wgsl"),
+    include_str!("brdf/masking.wgsl"),
+    include_str!("ndf/reflect.wgsl"),
+];
+
+/// Filtered look-ups, the twin of [`crate::lookup`].
+pub const LOOKUP: &str = include_str!("lookup.wgsl");
+
+/// The text that decodes and shades texels of a method with a lobe.
+///
+/// `attributes` (0 to 2) is how many colours each lobe carries: albedo with gloss, and specular colour. Only fitted lobes can.
+#[must_use]
+pub fn link(method: &dyn Method, lobe: &dyn Brdf, attributes: usize) -> String {
+    let own = method.shader();
+    let layers = method.layers() as u32;
+    let constants = [
+        ("LAYERS", layers),
+        ("ATTRIBUTES", attributes as u32),
+        ("ALL_LAYERS", layers * (1 + attributes as u32)),
+        ("TABLE", own.table as u32),
+    ];
+    let mut text: String = constants.iter().map(|(name, value)| value.declare(name)).collect();
+    text += &own.constants;
+    for source in SHARED.iter().chain([&lobe.shader()]).chain(own.sources) {
+        text.push('\n');
+        text += source;
+    }
+    text
+}
+
+/// The text of one normal's reflection by a lobe, without a method: what a truth is made of.
+#[must_use]
+pub fn link_lobe(lobe: &dyn Brdf) -> String {
+    let [reflection, lambert, masking, _] = SHARED;
+    [&1u32.declare("TABLE"), reflection, lambert, masking, lobe.shader()].join("\n")
+}

@@ -1,0 +1,120 @@
+//! What is drawn on: targets of one size, and the sums that pictures are read from.
+
+use glam::Vec3;
+use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::metrics::Picture;
+
+use crate::{Device, GpuError};
+
+/// How outlines are smoothed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outlines {
+    /// Not at all: one sample a pixel.
+    Sharp,
+    /// By the hardware: four samples of coverage a pixel, one of shading.
+    Multisampled,
+    /// As the CPU renderer does it: pixels with an outline are drawn in 4 × 4 parts.
+    Parts,
+}
+
+/// Parts of a pixel on each axis, for [`Outlines::Parts`].
+pub(crate) const PARTS: usize = 4;
+
+impl Outlines {
+    /// Coverage samples of the target.
+    pub(crate) fn samples(self) -> u32 {
+        if self == Self::Multisampled { 4 } else { 1 }
+    }
+
+    /// Format of the target: half floats for speed, or single ones for the digits.
+    pub(crate) fn format(self) -> wgpu::TextureFormat {
+        match self {
+            Self::Multisampled => wgpu::TextureFormat::Rgba16Float,
+            Self::Sharp | Self::Parts => wgpu::TextureFormat::Rgba32Float,
+        }
+    }
+}
+
+/// Format of depths; they run from 1 at the eye to 0 far away, where floats have digits to spare.
+pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// Format of places and faces.
+pub(crate) const PLACE: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+
+/// Targets of one size.
+pub struct Canvas<'a> {
+    pub(crate) device: &'a Device,
+    pub(crate) size: Size,
+    pub(crate) outlines: Outlines,
+    /// What passes draw on.
+    pub(crate) target: wgpu::TextureView,
+    /// Where several samples become one; `None` where there is but one.
+    pub(crate) resolved: Option<wgpu::TextureView>,
+    pub(crate) depth: wgpu::TextureView,
+    pub(crate) places: wgpu::TextureView,
+    pub(crate) faces: wgpu::TextureView,
+    pub(crate) mask: wgpu::TextureView,
+    /// Sums of pictures, RGBA.
+    pub(crate) sums: wgpu::Buffer,
+}
+
+impl<'a> Canvas<'a> {
+    /// Makes the targets.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn new(device: &'a Device, size: Size, outlines: Outlines) -> Result<Self, GpuError> {
+        let extent =
+            wgpu::Extent3d { width: size.width as u32, height: size.height as u32, depth_or_array_layers: 1 };
+        device.check_size("a picture", extent)?;
+        let sums = device.storage("a picture's pixels", 16 * size.area() as u64)?;
+        let texture = |size, format, samples, usage| {
+            let texture = device.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some("canvas"),
+                size,
+                mip_level_count: 1,
+                sample_count: samples,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage,
+                view_formats: &[],
+            });
+            texture.create_view(&wgpu::TextureViewDescriptor::default())
+        };
+        let (samples, format) = (outlines.samples(), outlines.format());
+        let drawn = wgpu::TextureUsages::RENDER_ATTACHMENT;
+        let read = wgpu::TextureUsages::TEXTURE_BINDING;
+        // Where outlines are not looked for, their targets are but one pixel.
+        let one = wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 };
+        let looked = if outlines == Outlines::Parts { extent } else { one };
+        let stored = wgpu::TextureUsages::STORAGE_BINDING;
+        Ok(Self {
+            device,
+            size,
+            outlines,
+            target: texture(extent, format, samples, if samples > 1 { drawn } else { drawn | read }),
+            resolved: (samples > 1).then(|| texture(extent, format, 1, drawn | read)),
+            depth: texture(extent, DEPTH, samples, drawn),
+            places: texture(looked, PLACE, 1, drawn | read),
+            faces: texture(looked, PLACE, 1, drawn | read),
+            mask: texture(looked, wgpu::TextureFormat::R32Uint, 1, stored | read),
+            sums,
+        })
+    }
+
+    /// The finished picture of a pass.
+    pub(crate) fn picture(&self) -> &wgpu::TextureView {
+        self.resolved.as_ref().unwrap_or(&self.target)
+    }
+
+    /// Waits for all work and reads the picture, in linear RGB.
+    ///
+    /// # Errors
+    /// What went wrong on the device.
+    pub fn read(&self) -> Result<Picture, GpuError> {
+        let bytes = self.device.read(&self.sums)?;
+        let values: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+        let colours = values.iter().map(|[r, g, b, _]| Vec3::new(*r, *g, *b)).collect();
+        Ok(Grid::from_vec(self.size, colours).unwrap_or_else(|| unreachable!("one colour a pixel")))
+    }
+}

@@ -1,0 +1,234 @@
+//! The device: which GPU it is, and how its failures come back as errors.
+
+use std::sync::{Arc, Mutex};
+
+use crate::GpuError;
+
+/// An opened GPU.
+pub struct Device {
+    pub(crate) device: wgpu::Device,
+    pub(crate) queue: wgpu::Queue,
+    name: String,
+    backend: wgpu::Backend,
+    software: bool,
+    /// The first thing that went wrong outside of any call.
+    failure: Arc<Mutex<Option<GpuError>>>,
+}
+
+/// What we use where it is there.
+const WANTED: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::FLOAT32_FILTERABLE);
+
+/// Groups in a row of a dispatch; shaders count invocations by it.
+const GROUPS_IN_A_ROW: u32 = 1024;
+
+impl Device {
+    /// Opens the fastest GPU there is; where there is none, a software one.
+    ///
+    /// # Errors
+    /// [`GpuError::NoAdapter`] and [`GpuError::NoDevice`].
+    pub fn open() -> Result<Self, GpuError> {
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+        let options = wgpu::RequestAdapterOptions {
+            power_preference: wgpu::PowerPreference::HighPerformance,
+            ..wgpu::RequestAdapterOptions::default()
+        };
+        let adapter = pollster::block_on(instance.request_adapter(&options))
+            .map_err(|e| GpuError::NoAdapter(e.to_string()))?;
+        let info = adapter.get_info();
+        let name = info.name.clone();
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("ndfmap"),
+            required_features: adapter.features() & WANTED,
+            required_limits: adapter.limits(),
+            ..wgpu::DeviceDescriptor::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|e| GpuError::NoDevice { adapter: name.clone(), reason: e.to_string() })?;
+        let failure = Arc::new(Mutex::new(None));
+        let (first, adapter) = (failure.clone(), name.clone());
+        device.on_uncaptured_error(Arc::new(move |e| note(&first, error_of(&adapter, &e))));
+        let (first, adapter) = (failure.clone(), name.clone());
+        device.set_device_lost_callback(move |reason, message| {
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                note(&first, GpuError::Lost { adapter: adapter.clone(), reason: message });
+            }
+        });
+        let software = info.device_type == wgpu::DeviceType::Cpu;
+        Ok(Self { device, queue, name, backend: info.backend, software, failure })
+    }
+
+    /// The adapter's name, its interface to us, and whether it is software.
+    #[must_use]
+    pub fn description(&self) -> String {
+        let software = if self.software { ", software" } else { "" };
+        format!("{} ({:?}{software})", self.name, self.backend)
+    }
+
+    /// True for a GPU that the processor plays.
+    #[must_use]
+    pub fn is_software(&self) -> bool {
+        self.software
+    }
+
+    /// True where the time of a pass is measured by the device itself.
+    #[must_use]
+    pub fn has_timestamps(&self) -> bool {
+        self.device.features().contains(wgpu::Features::TIMESTAMP_QUERY)
+    }
+
+    /// The adapter's name alone.
+    pub(crate) fn name(&self) -> String {
+        self.name.clone()
+    }
+
+    /// Waits for all work, and says what went wrong since the last time, if anything.
+    ///
+    /// # Errors
+    /// What the driver complained about.
+    pub fn wait(&self) -> Result<(), GpuError> {
+        let waited = self.device.poll(wgpu::PollType::wait_indefinitely());
+        let noted = self.failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take();
+        match (noted, waited) {
+            (Some(failure), _) => Err(failure),
+            (None, Err(e)) => Err(GpuError::Lost { adapter: self.name(), reason: e.to_string() }),
+            (None, Ok(_)) => Ok(()),
+        }
+    }
+
+    /// Checks that a texture of this size can be made.
+    pub(crate) fn check_size(&self, what: &str, size: wgpu::Extent3d) -> Result<(), GpuError> {
+        let limits = self.device.limits();
+        let (most, most_layers) = (limits.max_texture_dimension_2d, limits.max_texture_array_layers);
+        if size.width.max(size.height) <= most && size.depth_or_array_layers <= most_layers {
+            return Ok(());
+        }
+        Err(GpuError::TooLarge {
+            what: what.to_owned(),
+            width: size.width,
+            height: size.height,
+            layers: size.depth_or_array_layers,
+            adapter: self.name(),
+            most,
+            most_layers,
+        })
+    }
+
+    /// Checks that a buffer of so many bytes can be made and read by a shader.
+    pub(crate) fn check_bytes(&self, what: &'static str, bytes: u64) -> Result<(), GpuError> {
+        let limits = self.device.limits();
+        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        if bytes <= most {
+            return Ok(());
+        }
+        let reason = format!("{what} take {bytes} bytes, and it reads at most {most}");
+        Err(GpuError::Driver { adapter: self.name(), reason })
+    }
+
+    /// Runs the entry point `main` of a compute shader, of 64 invocations a group, once for each of `count`: binding 0 is read, 1 is
+    /// written.
+    ///
+    /// # Errors
+    /// What the driver complains about, an invalid shader included.
+    pub fn compute(&self, shader: &str, input: &[u8], output: u64, count: u32) -> Result<Vec<u8>, GpuError> {
+        use wgpu::util::DeviceExt;
+        self.check_bytes("the inputs", input.len() as u64)?;
+        let input = self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("input"),
+            contents: input,
+            usage: wgpu::BufferUsages::STORAGE,
+        });
+        let output = self.storage("output", output)?;
+        let pipeline = self.compute_pipeline(shader);
+        let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: input.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 1, resource: output.as_entire_binding() },
+            ],
+        });
+        self.dispatch(&pipeline, &group, count);
+        self.read(&output)
+    }
+
+    /// A buffer that shaders write and we read.
+    pub(crate) fn storage(&self, what: &'static str, size: u64) -> Result<wgpu::Buffer, GpuError> {
+        self.check_bytes(what, size)?;
+        Ok(self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(what),
+            size,
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        }))
+    }
+
+    /// The pipeline of a shader's entry point `main`.
+    pub(crate) fn compute_pipeline(&self, shader: &str) -> wgpu::ComputePipeline {
+        let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: None,
+            source: wgpu::ShaderSource::Wgsl(shader.into()),
+        });
+        self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: None,
+            layout: None,
+            module: &module,
+            entry_point: Some("main"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            cache: None,
+        })
+    }
+
+    /// Runs it once for each of `count`, in groups of 64.
+    pub(crate) fn dispatch(&self, pipeline: &wgpu::ComputePipeline, group: &wgpu::BindGroup, count: u32) {
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, group, &[]);
+            // Groups in a row are few by the standard: the rest goes to rows.
+            let groups = count.div_ceil(64);
+            let columns = groups.min(GROUPS_IN_A_ROW);
+            pass.dispatch_workgroups(columns, groups.div_ceil(columns), 1);
+        }
+        self.queue.submit([encoder.finish()]);
+    }
+
+    /// The bytes of a buffer, once all work is done.
+    pub(crate) fn read(&self, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
+        let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("readback"),
+            size: buffer.size(),
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
+        self.queue.submit([encoder.finish()]);
+        let mapped = Arc::new(Mutex::new(None));
+        let result = mapped.clone();
+        staging.map_async(wgpu::MapMode::Read, .., move |r| {
+            *result.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(r);
+        });
+        self.wait()?;
+        let driver = |reason: String| GpuError::Driver { adapter: self.name(), reason };
+        match mapped.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take() {
+            Some(Ok(())) => {
+                let view = staging.get_mapped_range(..).map_err(|e| driver(e.to_string()))?;
+                Ok(view.to_vec())
+            }
+            Some(Err(e)) => Err(driver(e.to_string())),
+            None => Err(driver("it never finished".to_owned())),
+        }
+    }
+}
+
+fn note(first: &Mutex<Option<GpuError>>, error: GpuError) {
+    first.lock().unwrap_or_else(std::sync::PoisonError::into_inner).get_or_insert(error);
+}
+
+fn error_of(adapter: &str, error: &wgpu::Error) -> GpuError {
+    match error {
+        wgpu::Error::OutOfMemory { .. } => GpuError::OutOfMemory(adapter.to_owned()),
+        other => GpuError::Driver { adapter: adapter.to_owned(), reason: other.to_string() },
+    }
+}

@@ -1,0 +1,69 @@
+//! What can go wrong on a GPU, in words that say what to do.
+
+/// A failure of the GPU, or of what was asked of it.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum GpuError {
+    /// No adapter, not even a software one.
+    #[error("there is no GPU that can be used, and no software Vulkan (Mesa's lavapipe is one): {0}")]
+    NoAdapter(String),
+    /// The adapter gave no device.
+    #[error("{adapter} cannot be opened: {reason}")]
+    NoDevice {
+        /// Its name.
+        adapter: String,
+        /// What it says.
+        reason: String,
+    },
+    /// A texture that is larger than textures can be.
+    #[error(
+        "{what} of {width} × {height} in {layers} layers is too large for {adapter}, which takes {most} × {most} in {most_layers}"
+    )]
+    TooLarge {
+        /// What is too large.
+        what: String,
+        /// Texels, or pixels.
+        width: u32,
+        /// Texels, or pixels.
+        height: u32,
+        /// Layers.
+        layers: u32,
+        /// The adapter's name.
+        adapter: String,
+        /// Its largest side.
+        most: u32,
+        /// Its most layers.
+        most_layers: u32,
+    },
+    /// Something that needs a feature the adapter lacks.
+    #[error("{adapter} has no {feature}: {instead}")]
+    Unsupported {
+        /// The adapter's name.
+        adapter: String,
+        /// What it lacks.
+        feature: &'static str,
+        /// What to do instead.
+        instead: &'static str,
+    },
+    /// The device went away.
+    #[error("{adapter} was lost: {reason}")]
+    Lost {
+        /// The adapter's name.
+        adapter: String,
+        /// What the driver says.
+        reason: String,
+    },
+    /// Memory ran out.
+    #[error("{0} has not enough memory for this picture and its maps")]
+    OutOfMemory(String),
+    /// A shader that does not hold together: our fault.
+    #[error("a shader is not valid: {0}")]
+    Shader(String),
+    /// Anything else that the driver or wgpu complains about.
+    #[error("{adapter}: {reason}")]
+    Driver {
+        /// The adapter's name.
+        adapter: String,
+        /// What it says.
+        reason: String,
+    },
+}

@@ -1,0 +1,64 @@
+//! Linking shaders: the text of core's twins and a pass of ours, checked before any device sees it.
+
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use ndfmap_core::brdf::Brdf;
+use ndfmap_core::ndf::Method;
+use ndfmap_core::shader::{self, LOOKUP};
+
+use crate::GpuError;
+
+/// The pass that draws, in all its ways to look maps up.
+pub const DRAW: &str = include_str!("passes/draw.wgsl");
+
+/// What draw passes share: the camera, the lights, the triangles.
+const SCENE: &str = include_str!("passes/scene.wgsl");
+
+/// The pass that draws the truth.
+const TRUTH: &str = include_str!("passes/truth.wgsl");
+
+/// The pass that draws places and faces.
+const PLACE: &str = include_str!("passes/place.wgsl");
+
+/// A checked shader.
+pub struct Linked {
+    /// Its text.
+    pub text: String,
+    /// The same, parsed.
+    pub module: naga::Module,
+    /// What is known of it.
+    pub info: ModuleInfo,
+}
+
+/// Parses and validates a shader.
+///
+/// # Errors
+/// [`GpuError::Shader`], with the place.
+pub fn check(text: String) -> Result<Linked, GpuError> {
+    let module =
+        naga::front::wgsl::parse_str(&text).map_err(|e| GpuError::Shader(e.emit_to_string(&text)))?;
+    let info = Validator::new(ValidationFlags::all(), Capabilities::default())
+        .validate(&module)
+        .map_err(|e| GpuError::Shader(e.emit_to_string(&text)))?;
+    Ok(Linked { text, module, info })
+}
+
+/// The shader that draws a method with a lobe; see [`shader::link`] for `attributes`.
+///
+/// # Errors
+/// [`GpuError::Shader`].
+pub fn draw(method: &dyn Method, lobe: &dyn Brdf, attributes: usize) -> Result<Linked, GpuError> {
+    check([&shader::link(method, lobe, attributes), LOOKUP, SCENE, DRAW].join("\n"))
+}
+
+/// The shader that draws the truth of a lobe. It has no method in it.
+///
+/// # Errors
+/// [`GpuError::Shader`].
+pub fn truth(lobe: &dyn Brdf) -> Result<Linked, GpuError> {
+    check([&shader::link_lobe(lobe), SCENE, TRUTH].join("\n"))
+}
+
+/// The shader that draws places and faces, for outlines.
+pub(crate) fn place() -> Result<Linked, GpuError> {
+    check([LOOKUP, SCENE, PLACE].join("\n"))
+}

@@ -1,0 +1,213 @@
+//! Baked materials in the GPU's memory: 2-D array textures with all their levels, filtered by the hardware.
+
+use half::f16;
+use half::slice::HalfFloatSliceExt;
+use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::lookup::{Lookup, Texels};
+use ndfmap_core::ndf::Method;
+use ndfmap_core::pyramid::{Precision, Pyramid};
+use ndfmap_core::scene::{BakedMaterial, Material};
+use ndfmap_core::surface::{SurfaceRow, Wrap, Wraps};
+
+use crate::{Device, GpuError};
+
+/// A material's textures.
+pub(crate) struct Textures {
+    pub(crate) map: wgpu::TextureView,
+    pub(crate) finish: wgpu::TextureView,
+    /// Attributes that the map's lobes carry.
+    pub(crate) attributes: usize,
+    /// Colours in `finish`.
+    pub(crate) mapped: u32,
+    pub(crate) size: Size,
+    pub(crate) wraps: Wraps,
+}
+
+/// The maps of a scene's materials, baked with one method. Camera, lights, lobes, models and meshes may change after.
+pub struct Maps<'a> {
+    pub(crate) method: &'a dyn Method,
+    pub(crate) materials: Vec<Textures>,
+}
+
+impl<'a> Maps<'a> {
+    /// Bakes every material's map and uploads it; `progress` is told the fraction done.
+    ///
+    /// # Errors
+    /// [`GpuError`] for maps that the device cannot hold or filter.
+    pub fn new(
+        device: &Device,
+        materials: &[Material],
+        method: &'a dyn Method,
+        precision: Precision,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<Self, GpuError> {
+        let count = materials.len() as f64;
+        let one = |(i, material): (usize, &Material)| {
+            let progress = |f: f64| progress((i as f64 + f) / count);
+            let baked = BakedMaterial::new(material, method, precision, &progress);
+            Textures::new(device, &material.name, &baked)
+        };
+        Ok(Self { method, materials: materials.iter().enumerate().map(one).collect::<Result<_, _>>()? })
+    }
+}
+
+impl Textures {
+    fn new(device: &Device, name: &str, baked: &BakedMaterial) -> Result<Self, GpuError> {
+        Ok(Self {
+            map: upload_pyramid(device, &format!("the map of material `{name}`"), &baked.pyramid)?,
+            finish: finish(device, name, &baked.finish, baked.pyramid.wraps(), true)?,
+            attributes: baked.attributes,
+            mapped: baked.finish.len() as u32,
+            size: baked.pyramid.sizes()[0],
+            wraps: baked.pyramid.wraps(),
+        })
+    }
+
+    /// Normals of the finest level, one by one, and what they are made of: for the truth.
+    pub(crate) fn finest(device: &Device, material: &Material) -> Result<Self, GpuError> {
+        let (size, wraps) = (material.surface.size(), material.surface.wraps());
+        let what = format!("the map of material `{}`", material.name);
+        let mut row = SurfaceRow::flat(size.width);
+        let mut values = Vec::with_capacity(4 * size.area());
+        for y in 0..size.height {
+            material.surface.read_row(y, &mut row);
+            values.extend((0..size.width).flat_map(|x| row.normal(x).extend(0.0).to_array()));
+        }
+        let layout = Stored { layers: 1, levels: 1, format: wgpu::TextureFormat::Rgba32Float };
+        let texture = create(device, &what, size, layout)?;
+        write(device, &texture, 0, size, bytemuck::cast_slice(&values));
+        let grids = material.finish_map.as_ref().map_or_else(Vec::new, |map| map.grids());
+        Ok(Self {
+            map: texture.create_view(&wgpu::TextureViewDescriptor::default()),
+            finish: finish(device, &material.name, &grids, wraps, false)?,
+            attributes: 0,
+            mapped: grids.len() as u32,
+            size,
+            wraps,
+        })
+    }
+}
+
+/// The sampler for maps with these wraps; `anisotropy` 1 is plain trilinear filtering.
+pub(crate) fn sampler(device: &Device, wraps: Wraps, anisotropy: u16) -> wgpu::Sampler {
+    let mode = |wrap| match wrap {
+        Wrap::Repeat => wgpu::AddressMode::Repeat,
+        Wrap::Clamp => wgpu::AddressMode::ClampToEdge,
+    };
+    device.device.create_sampler(&wgpu::SamplerDescriptor {
+        label: None,
+        address_mode_u: mode(wraps.x),
+        address_mode_v: mode(wraps.y),
+        mag_filter: wgpu::FilterMode::Linear,
+        min_filter: wgpu::FilterMode::Linear,
+        mipmap_filter: wgpu::MipmapFilterMode::Linear,
+        anisotropy_clamp: anisotropy.max(1),
+        ..wgpu::SamplerDescriptor::default()
+    })
+}
+
+/// How texels lie in a texture.
+#[derive(Clone, Copy)]
+struct Stored {
+    layers: usize,
+    levels: usize,
+    format: wgpu::TextureFormat,
+}
+
+fn create(device: &Device, what: &str, size: Size, stored: Stored) -> Result<wgpu::Texture, GpuError> {
+    let extent = wgpu::Extent3d {
+        width: size.width as u32,
+        height: size.height as u32,
+        depth_or_array_layers: stored.layers as u32,
+    };
+    device.check_size(what, extent)?;
+    Ok(device.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(what),
+        size: extent,
+        mip_level_count: stored.levels as u32,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: stored.format,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    }))
+}
+
+/// Uploads a level: its layers one after another, each rows of texels.
+fn write(device: &Device, texture: &wgpu::Texture, level: u32, size: Size, bytes: &[u8]) {
+    let (width, height) = (size.width as u32, size.height as u32);
+    let texel = texture.format().block_copy_size(None).unwrap_or(8);
+    let layers = bytes.len() as u32 / (texel * width * height);
+    device.queue.write_texture(
+        wgpu::TexelCopyTextureInfo {
+            texture,
+            mip_level: level,
+            origin: wgpu::Origin3d::ZERO,
+            aspect: wgpu::TextureAspect::All,
+        },
+        bytes,
+        wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(texel * width),
+            rows_per_image: Some(height),
+        },
+        wgpu::Extent3d { width, height, depth_or_array_layers: layers },
+    );
+}
+
+fn array_view(texture: &wgpu::Texture) -> wgpu::TextureView {
+    texture.create_view(&wgpu::TextureViewDescriptor {
+        dimension: Some(wgpu::TextureViewDimension::D2Array),
+        ..wgpu::TextureViewDescriptor::default()
+    })
+}
+
+fn upload_pyramid(device: &Device, what: &str, pyramid: &Pyramid) -> Result<wgpu::TextureView, GpuError> {
+    let format = match pyramid.precision() {
+        Precision::Half => wgpu::TextureFormat::Rgba16Float,
+        Precision::Single if device.device.features().contains(wgpu::Features::FLOAT32_FILTERABLE) => {
+            wgpu::TextureFormat::Rgba32Float
+        }
+        Precision::Single => {
+            return Err(GpuError::Unsupported {
+                adapter: device.name(),
+                feature: "filtering of 32-bit floats",
+                instead: "bake in half floats",
+            });
+        }
+    };
+    let sizes = pyramid.sizes();
+    // OpenGL takes an array of one layer for no array, and reads nothing: a second one costs little.
+    let stored = Stored { layers: pyramid.layers().max(2), levels: sizes.len(), format };
+    let texture = create(device, what, sizes[0], stored)?;
+    for (level, size) in sizes.iter().enumerate() {
+        write(device, &texture, level as u32, *size, pyramid.level_bytes(level));
+    }
+    Ok(array_view(&texture))
+}
+
+/// Colours, one a layer; a single dark texel where there are none.
+fn finish(
+    device: &Device,
+    name: &str,
+    grids: &[Grid<[f32; 4]>],
+    wraps: Wraps,
+    mipped: bool,
+) -> Result<wgpu::TextureView, GpuError> {
+    let none = [Grid::from_fn(Size { width: 1, height: 1 }, |_, _| [0.0; 4])];
+    let grids = if grids.is_empty() { &none } else { grids };
+    let lookups: Vec<Lookup> = grids.iter().map(|values| Lookup::of_values(values, wraps)).collect();
+    let sizes = lookups[0].sizes();
+    let levels = if mipped { sizes.len() } else { 1 };
+    let stored = Stored { layers: 2, levels, format: wgpu::TextureFormat::Rgba16Float };
+    let texture = create(device, &format!("the colours of material `{name}`"), sizes[0], stored)?;
+    for (level, size) in sizes.iter().enumerate().take(levels) {
+        let texel = |lookup: &Lookup, i: usize| lookup.texel(level, i % size.width, i / size.width).to_vec();
+        let layer = |lookup| (0..size.area()).flat_map(move |i| texel(lookup, i));
+        let values: Vec<f32> = lookups.iter().flat_map(layer).collect();
+        let mut halves = vec![f16::ZERO; values.len()];
+        halves.convert_from_f32_slice(&values);
+        write(device, &texture, level as u32, *size, bytemuck::cast_slice(&halves));
+    }
+    Ok(array_view(&texture))
+}

@@ -1,0 +1,133 @@
+// Draws a scene through a baked map: look up, decode, shade. One entry point for each way to look up.
+
+struct Material {
+    plain: Finish,
+    // Texels of the finest level.
+    texels: vec2<f32>,
+    // Colours in `finish`: 0 none, 1 albedo and gloss, 2 specular colour as well.
+    mapped: u32,
+    // Which axes repeat: 1 the first, 2 the second.
+    repeat: u32,
+    reflection: Reflection,
+}
+
+@group(1) @binding(0) var<uniform> material: Material;
+@group(1) @binding(1) var map: texture_2d_array<f32>;
+@group(1) @binding(2) var finish_map: texture_2d_array<f32>;
+@group(1) @binding(3) var linear: sampler;
+
+// What a place is made of, where lobes do not say so themselves.
+fn plain_finish(diffuse_gloss: vec4<f32>, specular: vec4<f32>) -> Finish {
+    var finish = material.plain;
+    if material.mapped > 0u {
+        finish.diffuse = diffuse_gloss.xyz;
+        finish.gloss = max(diffuse_gloss.w, 0.0);
+    }
+    if material.mapped > 1u {
+        finish.specular = specular.xyz;
+    }
+    return finish;
+}
+
+// The light of all lights from a texel.
+fn shade(place: Place, channels: ptr<function, Channels>, plain: Finish) -> vec3<f32> {
+    var decoded = decode(channels);
+    var sum = vec3<f32>(0.0);
+    if place.wo.z <= 0.0 {
+        return sum;
+    }
+    for (var i = 0u; i < view.lights; i++) {
+        let light = seen_from(place, i);
+        if light.wi.z > 0.0 {
+            let way = way_between(light.wi, place.wo);
+            sum += light.irradiance * reflect_texel(channels, &decoded, plain, material.reflection, way);
+        }
+    }
+    return sum;
+}
+
+fn taps_of(place: Place) -> Taps {
+    var filtering = view.filtering;
+    filtering.levels = textureNumLevels(map);
+    return taps(PixelFootprint(place.uv, place.duv_dx, place.duv_dy), material.texels, filtering);
+}
+
+// Colours by the filter's taps.
+fn filtered_finish(around: Taps) -> Finish {
+    var colours = array<vec4<f32>, 2>();
+    let share = 1.0 / f32(around.columns * around.rows);
+    for (var k = 0u; k < min(material.mapped, 2u); k++) {
+        for (var i = 0u; i < around.columns * around.rows; i++) {
+            colours[k] += share * trilinear(finish_map, linear, tap(around, i), k, around.lod);
+        }
+    }
+    return plain_finish(colours[0], colours[1]);
+}
+
+// Our own taps: the same on every device.
+@fragment
+fn filtered(in: Varying) -> @location(0) vec4<f32> {
+    if masked_out(in.pixel) {
+        return vec4<f32>(0.0);
+    }
+    let place = place_of(in);
+    let around = taps_of(place);
+    var channels = Channels();
+    let count = around.columns * around.rows;
+    for (var i = 0u; i < count; i++) {
+        let uv = tap(around, i);
+        for (var layer = 0u; layer < ALL_LAYERS; layer++) {
+            channels[layer] += trilinear(map, linear, uv, layer, around.lod);
+        }
+    }
+    for (var layer = 0u; layer < ALL_LAYERS; layer++) {
+        channels[layer] /= f32(count);
+    }
+    return vec4<f32>(shade(place, &channels, filtered_finish(around)), 1.0);
+}
+
+// The sampler's own choice of levels and taps.
+@fragment
+fn sampled(in: Varying) -> @location(0) vec4<f32> {
+    if masked_out(in.pixel) {
+        return vec4<f32>(0.0);
+    }
+    let place = place_of(in);
+    var channels = Channels();
+    for (var layer = 0u; layer < ALL_LAYERS; layer++) {
+        channels[layer] = textureSampleGrad(map, linear, place.uv, layer, place.duv_dx, place.duv_dy);
+    }
+    var colours = array<vec4<f32>, 2>();
+    for (var k = 0u; k < min(material.mapped, 2u); k++) {
+        colours[k] = textureSampleGrad(finish_map, linear, place.uv, k, place.duv_dx, place.duv_dy);
+    }
+    return vec4<f32>(shade(place, &channels, plain_finish(colours[0], colours[1])), 1.0);
+}
+
+// Every texel that the filter reads is shaded by itself: for what must not be mixed, or is not aligned.
+@fragment
+fn neighbours(in: Varying) -> @location(0) vec4<f32> {
+    if masked_out(in.pixel) {
+        return vec4<f32>(0.0);
+    }
+    let place = place_of(in);
+    let around = taps_of(place);
+    let plain = filtered_finish(around);
+    let repeat = vec2<bool>((material.repeat & 1u) != 0u, (material.repeat & 2u) != 0u);
+    let count = around.columns * around.rows;
+    var sum = vec3<f32>(0.0);
+    for (var i = 0u; i < count; i++) {
+        let uv = tap(around, i);
+        for (var k = 0u; k < 8u; k++) {
+            let n = neighbour(map, uv, around.lod, repeat, k);
+            if n.weight > 0.0 {
+                var channels: Channels;
+                for (var layer = 0u; layer < ALL_LAYERS; layer++) {
+                    channels[layer] = textureLoad(map, n.texel, layer, n.level);
+                }
+                sum += n.weight * shade(place, &channels, plain);
+            }
+        }
+    }
+    return vec4<f32>(sum / f32(count), 1.0);
+}

@@ -1,0 +1,152 @@
+// What the passes that draw share: the camera, the lights, the triangles, and the surface under a pixel.
+//
+// Vertices are pulled from storage, so that a fragment knows its whole triangle: its face, and how the place on the map moves
+// in its plane. The twin is `Geometry` of the CPU renderer, which this must see alike.
+
+struct View {
+    // Clip space from a place relative to the eye.
+    clip: mat4x4<f32>,
+    // Where the rays start, as places are: relative to the scene's middle.
+    eye: vec3<f32>,
+    // How many lights.
+    lights: u32,
+    // The ray through a place (x, y) in the picture is corner + x right + y down.
+    corner: vec3<f32>,
+    // Width of what is shaded, in pixels.
+    width: f32,
+    right: vec3<f32>,
+    seed: u32,
+    down: vec3<f32>,
+    // 1: only where `mask` is not 0.
+    masked: u32,
+    filtering: Filtering,
+}
+
+struct Vertex {
+    // Position relative to the scene's middle, and uv.x.
+    position_u: vec4<f32>,
+    // Unit normal, and uv.y.
+    normal_v: vec4<f32>,
+    // Unit tangent, and the sign of the bitangent.
+    tangent: vec4<f32>,
+}
+
+struct Triangle {
+    // Unit normal, and the object.
+    face: vec4<f32>,
+    // How u and v change with the place.
+    grad_u: vec4<f32>,
+    grad_v: vec4<f32>,
+}
+
+struct Light {
+    // Unit vector to the light (w = 0), or where it is (w = 1).
+    place: vec4<f32>,
+    // Irradiance on a plane that faces it, or radiant intensity.
+    power: vec4<f32>,
+}
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var<storage, read> lights: array<Light>;
+@group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
+@group(0) @binding(3) var<storage, read> corners: array<u32>;
+@group(0) @binding(4) var<storage, read> triangles: array<Triangle>;
+
+@group(0) @binding(5) var mask: texture_2d<u32>;
+
+// True where nothing is to be drawn.
+fn masked_out(pixel: vec4<f32>) -> bool {
+    return view.masked == 1u && textureLoad(mask, vec2<i32>(pixel.xy), 0).x == 0u;
+}
+
+struct Varying {
+    @builtin(position) pixel: vec4<f32>,
+    @location(0) position: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    @location(2) tangent: vec3<f32>,
+    @location(3) uv: vec2<f32>,
+    @location(4) @interpolate(flat) bitangent_sign: f32,
+    @location(5) @interpolate(flat) triangle: u32,
+}
+
+@vertex
+fn project(@builtin(vertex_index) i: u32) -> Varying {
+    let v = vertices[corners[i]];
+    let first = vertices[corners[i - i % 3u]];
+    let clip = view.clip * vec4<f32>(v.position_u.xyz - view.eye, 1.0);
+    let uv = vec2<f32>(v.position_u.w, v.normal_v.w);
+    return Varying(clip, v.position_u.xyz, v.normal_v.xyz, v.tangent.xyz, uv, first.tangent.w, i / 3u);
+}
+
+// What lies under a pixel.
+struct Place {
+    position: vec3<f32>,
+    // Tangent, bitangent, normal as columns; the normal faces the eye.
+    frame: mat3x3<f32>,
+    // To the eye, in that frame.
+    wo: vec3<f32>,
+    uv: vec2<f32>,
+    // Change of uv to the next pixel on the right, and below.
+    duv_dx: vec2<f32>,
+    duv_dy: vec2<f32>,
+}
+
+// Least cosine between a place's normal and the eye.
+const LEAST_FACING: f32 = 1e-3;
+
+fn reject(v: vec3<f32>, n: vec3<f32>) -> vec3<f32> {
+    return v - n * dot(v, n);
+}
+
+// How far the place moves as the pixel moves by `step` (Igehy 1999).
+fn differential(step: vec3<f32>, ray: vec3<f32>, face: vec3<f32>, distance: f32) -> vec3<f32> {
+    let along = dot(ray, face);
+    let held = select(along, 1e-9, abs(along) < 1e-9);
+    return distance * inverseSqrt(dot(ray, ray)) * (step - ray * (dot(step, face) / held));
+}
+
+fn place_of(in: Varying) -> Place {
+    let triangle = triangles[in.triangle];
+    let ray = view.corner + view.right * in.pixel.x + view.down * in.pixel.y;
+    let direction = normalize(ray);
+    let side = select(1.0, -1.0, dot(triangle.face.xyz, direction) > 0.0);
+    var normal = normalize(in.normal) * side;
+    // Where the normal between corners has turned away from the eye, it is bent back until it just does not.
+    let facing = -dot(normal, direction);
+    if facing < LEAST_FACING {
+        normal = normalize(normal - direction * (LEAST_FACING - facing));
+    }
+    let across = reject(in.tangent, normal);
+    var tangent = normalize(across);
+    if dot(across, across) < 1e-12 {
+        tangent = normalize(reject(select(vec3<f32>(1.0, 0.0, 0.0), vec3<f32>(0.0, 1.0, 0.0), abs(normal.x) > 0.5), normal));
+    }
+    let axes = mat3x3<f32>(tangent, cross(normal, tangent) * in.bitangent_sign, normal);
+    let distance = length(in.position - view.eye);
+    let dx = differential(view.right, ray, triangle.face.xyz, distance) * view.width;
+    let dy = differential(view.down, ray, triangle.face.xyz, distance) * view.width;
+    return Place(
+        in.position,
+        axes,
+        -direction * axes,
+        in.uv,
+        vec2<f32>(dot(triangle.grad_u.xyz, dx), dot(triangle.grad_v.xyz, dx)),
+        vec2<f32>(dot(triangle.grad_u.xyz, dy), dot(triangle.grad_v.xyz, dy)),
+    );
+}
+
+// A light as a place sees it: unit vector to it in the tangent frame, and its irradiance.
+struct Seen {
+    wi: vec3<f32>,
+    irradiance: vec3<f32>,
+}
+
+fn seen_from(place: Place, i: u32) -> Seen {
+    let light = lights[i];
+    if light.place.w == 0.0 {
+        return Seen(light.place.xyz * place.frame, light.power.xyz);
+    }
+    let way = light.place.xyz - place.position;
+    let square = max(dot(way, way), 1e-12);
+    return Seen(way * inverseSqrt(square) * place.frame, light.power.xyz / square);
+}

@@ -1,0 +1,200 @@
+//! Pipelines: made when first asked for, kept for every frame after.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use ndfmap_core::brdf::Brdf;
+use ndfmap_core::ndf::Method;
+
+use crate::canvas::{DEPTH, Outlines, PLACE};
+use crate::link;
+use crate::{Device, GpuError};
+
+/// What a pipeline is kept under.
+#[derive(Clone, PartialEq, Eq, Hash)]
+pub(crate) enum Key {
+    /// A method (its spelling), a lobe (its text), attributes, the entry point, outlines.
+    Draw(String, &'static str, usize, &'static str, u32),
+    /// The truth of a lobe.
+    Truth(&'static str),
+    /// Places and faces.
+    Place,
+}
+
+/// Layouts that all pipelines share, and the pipelines.
+pub(crate) struct Pipelines<'a> {
+    device: &'a Device,
+    /// Group 0: view, lights, triangles, mask.
+    pub(crate) scene: wgpu::BindGroupLayout,
+    /// Group 1 of [`Key::Draw`]: material, map, colours, sampler.
+    pub(crate) material: wgpu::BindGroupLayout,
+    /// Group 1 of [`Key::Truth`]: material, normals, colours.
+    pub(crate) finest: wgpu::BindGroupLayout,
+    made: Mutex<HashMap<Key, Arc<wgpu::RenderPipeline>>>,
+}
+
+/// A binding that vertices and fragments see.
+fn entry(binding: u32, ty: wgpu::BindingType) -> wgpu::BindGroupLayoutEntry {
+    let visibility = wgpu::ShaderStages::VERTEX_FRAGMENT;
+    wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None }
+}
+
+fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
+    wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None }
+}
+
+fn texture(sample_type: wgpu::TextureSampleType, array: bool) -> wgpu::BindingType {
+    let view_dimension =
+        if array { wgpu::TextureViewDimension::D2Array } else { wgpu::TextureViewDimension::D2 };
+    wgpu::BindingType::Texture { sample_type, view_dimension, multisampled: false }
+}
+
+impl<'a> Pipelines<'a> {
+    pub(crate) fn new(device: &'a Device) -> Self {
+        let uniform = || buffer(wgpu::BufferBindingType::Uniform);
+        let storage = || buffer(wgpu::BufferBindingType::Storage { read_only: true });
+        let float = |filterable| wgpu::TextureSampleType::Float { filterable };
+        let layout = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
+            let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some(label), entries };
+            device.device.create_bind_group_layout(&descriptor)
+        };
+        let scene = layout(
+            "scene",
+            &[
+                entry(0, uniform()),
+                entry(1, storage()),
+                entry(2, storage()),
+                entry(3, storage()),
+                entry(4, storage()),
+                entry(5, texture(wgpu::TextureSampleType::Uint, false)),
+            ],
+        );
+        let material = layout(
+            "material",
+            &[
+                entry(0, uniform()),
+                entry(1, texture(float(true), true)),
+                entry(2, texture(float(true), true)),
+                entry(3, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
+            ],
+        );
+        let finest = layout(
+            "finest",
+            &[
+                entry(0, uniform()),
+                entry(1, texture(float(false), false)),
+                entry(2, texture(float(true), true)),
+            ],
+        );
+        Self { device, scene, material, finest, made: Mutex::default() }
+    }
+
+    /// The pipeline that draws a method with a lobe.
+    pub(crate) fn draw(
+        &self,
+        (method, lobe): (&dyn Method, &dyn Brdf),
+        attributes: usize,
+        entry: &'static str,
+        outlines: Outlines,
+    ) -> Result<Arc<wgpu::RenderPipeline>, GpuError> {
+        let key = Key::Draw(method.spelling(), lobe.shader(), attributes, entry, outlines.samples());
+        self.get(key, || {
+            let text = link::draw(method, lobe, attributes)?.text;
+            let targets = [outlines.format()];
+            let groups = [&self.scene, &self.material];
+            Ok(build(self.device, &Plan { text: &text, entry, targets: &targets, groups: &groups, outlines }))
+        })
+    }
+
+    /// The pipeline that draws the truth of a lobe.
+    pub(crate) fn truth(&self, lobe: &dyn Brdf) -> Result<Arc<wgpu::RenderPipeline>, GpuError> {
+        self.get(Key::Truth(lobe.shader()), || {
+            let text = link::truth(lobe)?.text;
+            let outlines = Outlines::Sharp;
+            let targets = [outlines.format()];
+            let groups = [&self.scene, &self.finest];
+            let plan = Plan { text: &text, entry: "truth", targets: &targets, groups: &groups, outlines };
+            Ok(build(self.device, &plan))
+        })
+    }
+
+    /// The pipeline that draws places and faces.
+    pub(crate) fn place(&self) -> Result<Arc<wgpu::RenderPipeline>, GpuError> {
+        self.get(Key::Place, || {
+            let text = link::place()?.text;
+            let outlines = Outlines::Sharp;
+            let groups = [&self.scene];
+            let plan =
+                Plan { text: &text, entry: "place", targets: &[PLACE, PLACE], groups: &groups, outlines };
+            Ok(build(self.device, &plan))
+        })
+    }
+
+    fn get(
+        &self,
+        key: Key,
+        make: impl FnOnce() -> Result<wgpu::RenderPipeline, GpuError>,
+    ) -> Result<Arc<wgpu::RenderPipeline>, GpuError> {
+        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(pipeline) = made.get(&key) {
+            return Ok(pipeline.clone());
+        }
+        let pipeline = Arc::new(make()?);
+        made.insert(key, pipeline.clone());
+        Ok(pipeline)
+    }
+}
+
+/// What a pipeline is built from.
+struct Plan<'a> {
+    text: &'a str,
+    entry: &'static str,
+    targets: &'a [wgpu::TextureFormat],
+    groups: &'a [&'a wgpu::BindGroupLayout],
+    outlines: Outlines,
+}
+
+fn build(device: &Device, plan: &Plan<'_>) -> wgpu::RenderPipeline {
+    let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some(plan.entry),
+        source: wgpu::ShaderSource::Wgsl(plan.text.into()),
+    });
+    let groups: Vec<Option<&wgpu::BindGroupLayout>> = plan.groups.iter().map(|g| Some(*g)).collect();
+    let layout = device.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: None,
+        bind_group_layouts: &groups,
+        immediate_size: 0,
+    });
+    let targets: Vec<Option<wgpu::ColorTargetState>> =
+        plan.targets.iter().map(|format| Some((*format).into())).collect();
+    device.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(plan.entry),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: Some("project"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(wgpu::CompareFunction::Greater),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        }),
+        multisample: wgpu::MultisampleState {
+            count: plan.outlines.samples(),
+            ..wgpu::MultisampleState::default()
+        },
+        fragment: Some(wgpu::FragmentState {
+            module: &module,
+            entry_point: Some(plan.entry),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            targets: &targets,
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}

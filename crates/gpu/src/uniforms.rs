@@ -1,0 +1,129 @@
+//! Numbers as shaders take them: twins in memory of the structures in `passes/`.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Mat4, Vec3, Vec4};
+use ndfmap_core::grid::Size;
+use ndfmap_core::light::Light;
+use ndfmap_core::lookup::Filtering;
+use ndfmap_core::ndf::Prepared;
+use ndfmap_core::scene::{Camera, Material};
+use ndfmap_core::surface::{Wrap, Wraps};
+
+use crate::geometry::Geometry;
+
+/// `View` in `scene.wgsl`.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct View {
+    pub(crate) clip: Mat4,
+    pub(crate) eye: Vec3,
+    pub(crate) lights: u32,
+    pub(crate) corner: Vec3,
+    pub(crate) width: f32,
+    pub(crate) right: Vec3,
+    pub(crate) seed: u32,
+    pub(crate) down: Vec3,
+    pub(crate) masked: u32,
+    pub(crate) max_taps: u32,
+    pub(crate) parts: u32,
+    pub(crate) lod_bias: f32,
+    pub(crate) levels: u32,
+}
+
+impl View {
+    /// What a camera sees, a pixel at a time.
+    pub(crate) fn new(camera: &Camera, size: Size, geometry: &Geometry) -> Self {
+        let rays = camera.rays(size);
+        let forward = rays.right.cross(rays.down).normalize_or(DVec3::NEG_Z);
+        // A place p (relative to the eye) at depth p·forward is seen at x = p·right / (right² depth) + middle.x; y alike.
+        let axis = |step: DVec3, pixels: usize| {
+            let square = step.length_squared();
+            let middle = -rays.corner.dot(step) / square;
+            step * (2.0 / (pixels as f64 * square)) + forward * (2.0 * middle / pixels as f64 - 1.0)
+        };
+        let (x, y) = (axis(rays.right, size.width), -axis(rays.down, size.height));
+        // Nothing is nearer than this; beyond it depths go on for ever.
+        let near = 1e-5 * (geometry.radius + geometry.middle.distance(rays.eye));
+        let column = |k: usize| Vec4::new(x[k] as f32, y[k] as f32, 0.0, forward[k] as f32);
+        Self {
+            clip: Mat4::from_cols(column(0), column(1), column(2), Vec4::new(0.0, 0.0, near as f32, 0.0)),
+            eye: (rays.eye - geometry.middle).as_vec3(),
+            lights: 0,
+            corner: rays.corner.as_vec3(),
+            width: 1.0,
+            right: rays.right.as_vec3(),
+            seed: 0,
+            down: rays.down.as_vec3(),
+            masked: 0,
+            max_taps: 1,
+            parts: 1,
+            lod_bias: 0.0,
+            levels: 1,
+        }
+    }
+
+    /// The same with the filter of another.
+    pub(crate) fn filtered_as(self, other: &Self) -> Self {
+        let Self { max_taps, parts, lod_bias, .. } = *other;
+        Self { max_taps, parts, lod_bias, ..self }
+    }
+
+    /// The same with a filter.
+    pub(crate) fn with_filter(self, filtering: Filtering) -> Self {
+        Self {
+            max_taps: filtering.max_taps as u32,
+            parts: filtering.parts as u32,
+            lod_bias: filtering.lod_bias as f32,
+            ..self
+        }
+    }
+}
+
+/// `Light` in `scene.wgsl`.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct LightUniform {
+    place: Vec4,
+    power: Vec4,
+}
+
+impl LightUniform {
+    /// A light; places are relative to `middle`.
+    pub(crate) fn new(light: &Light, middle: DVec3) -> Self {
+        match *light {
+            Light::Directional { towards, irradiance } => {
+                Self { place: towards.as_vec3().extend(0.0), power: irradiance.as_vec3().extend(0.0) }
+            }
+            Light::Point { at, intensity } => {
+                Self { place: (at - middle).as_vec3().extend(1.0), power: intensity.as_vec3().extend(0.0) }
+            }
+        }
+    }
+}
+
+/// `Material` in `draw.wgsl`, with its table at the end.
+pub(crate) fn material(
+    material: &Material,
+    (size, wraps): (Size, Wraps),
+    mapped: u32,
+    prepared: Option<&Prepared>,
+    at_means: bool,
+) -> Vec<u8> {
+    let finish = material.finish;
+    let bit = |wrap: Wrap, bit: u32| if wrap == Wrap::Repeat { bit } else { 0 };
+    let gloss = finish.gloss.get() as f32;
+    let mut bytes = Vec::new();
+    let mut four = |values: [[u8; 4]; 4]| bytes.extend(values.as_flattened());
+    let f = |v: f64| (v as f32).to_le_bytes();
+    let of = |c: DVec3, w: f32| [f(c.x), f(c.y), f(c.z), w.to_le_bytes()];
+    four(of(finish.diffuse, gloss));
+    four(of(finish.specular, 0.0));
+    let repeat = bit(wraps.x, 1) | bit(wraps.y, 2);
+    four([f(size.width as f64), f(size.height as f64), mapped.to_le_bytes(), repeat.to_le_bytes()]);
+    let reflection = &material.reflection;
+    let model = reflection.model.index().to_le_bytes();
+    four([f(reflection.lobe.base()), model, u32::from(at_means).to_le_bytes(), gloss.to_le_bytes()]);
+    let table = prepared.map_or_else(|| vec![[0.0; 4]], Prepared::table);
+    table.iter().for_each(|entry| four(entry.map(f32::to_le_bytes)));
+    bytes
+}

@@ -1,0 +1,251 @@
+//! The twins agree: every method's decoding and shading, and every lobe's functions, on the GPU and on the CPU.
+//!
+//! An output may differ by 1e-5 of itself (the issue of single floats: a chain of some tens of roundings of 6e-8, and `exp` and
+//! `pow`, which devices are allowed 2e-6 for), and by what the exact function would change if its inputs moved by a few of their own
+//! last digits (`INPUT_STEP`). The second is no slack of ours: where a function multiplies such a step, no arithmetic in single floats
+//! can do without, as in `1 - |r|²` of a narrow lobe.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
+
+mod common;
+
+use common::device;
+use glam::{DVec3, Vec3};
+use ndfmap_core::bake::Bake;
+use ndfmap_core::brdf;
+use ndfmap_core::grid::Size;
+use ndfmap_core::lookup::Lookup;
+use ndfmap_core::ndf::{self, FilteredTexel, Lit, Method};
+use ndfmap_core::procedural;
+use ndfmap_core::pyramid::Precision;
+use ndfmap_core::reflection::{Finish, Model, Reflection, Way};
+use ndfmap_core::shader;
+use ndfmap_core::units::SlopeVariance;
+use ndfmap_gpu::Device;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+/// Relative error allowed.
+const RELATIVE: f64 = 1e-5;
+
+/// Steps that inputs are moved by, of the largest in their vector: four units in the last place.
+const INPUT_STEP: f32 = 4.8e-7;
+
+/// One evaluation: a material, a way, a texel.
+#[derive(Clone, Debug)]
+struct Probe {
+    finish: Finish,
+    wi: Vec3,
+    wo: Vec3,
+    /// The normal of a facet.
+    normal: Vec3,
+    at_means: bool,
+    channels: Vec<f32>,
+}
+
+fn unit(v: DVec3) -> Vec3 {
+    v.normalize().as_vec3()
+}
+
+fn towards(random: &mut Pcg64Mcg) -> Vec3 {
+    let [x, y]: [f64; 2] = random.random();
+    let z: f64 = random.random();
+    unit(DVec3::new(2.0 * x - 1.0, 2.0 * y - 1.0, z * z + 0.02))
+}
+
+/// Texels of all levels of a real map, mixed as filters mix them, and degenerate ones.
+fn probes(method: &dyn Method, count: usize) -> Vec<Probe> {
+    let mut random = Pcg64Mcg::seed_from_u64(7);
+    let size = Size { width: 64, height: 64 };
+    let surface = (procedural::find("foil").unwrap().build)(size);
+    let (pyramid, _) =
+        Bake { surface: &*surface, method, precision: Precision::Half, progress: &|_| () }.to_pyramid();
+    let map = Lookup::new(&pyramid);
+    let texel = |random: &mut Pcg64Mcg| {
+        let level = random.random_range(0..pyramid.sizes().len());
+        let size = pyramid.sizes()[level];
+        map.texel(level, random.random_range(0..size.width), random.random_range(0..size.height)).to_vec()
+    };
+    let probe = |i: usize| {
+        let mut channels = texel(&mut random);
+        if i % 3 == 1 && method.filterable() {
+            let (other, t) = (texel(&mut random), random.random::<f32>());
+            channels.iter_mut().zip(other).for_each(|(c, o)| *c += t * (o - *c));
+        }
+        match i % 50 {
+            48 => channels.fill(0.0),
+            49 => channels.iter_mut().skip(4).for_each(|c| *c = 0.0),
+            _ => {}
+        }
+        let gloss = if i.is_multiple_of(4) { 0.05 * random.random::<f64>() } else { 0.0 };
+        let colour = |random: &mut Pcg64Mcg| DVec3::from(random.random::<[f32; 3]>().map(f64::from));
+        let finish = Finish {
+            diffuse: colour(&mut random),
+            specular: colour(&mut random),
+            gloss: SlopeVariance::clamped(f64::from(gloss as f32)),
+        };
+        let [wi, wo, normal] = [(); 3].map(|()| towards(&mut random));
+        Probe { finish, wi, wo, normal, at_means: i.is_multiple_of(5), channels }
+    };
+    (0..count).map(probe).collect()
+}
+
+/// What both are asked, with the same numbers.
+struct Question<'a> {
+    method: &'a dyn Method,
+    reflection: &'a Reflection,
+}
+
+impl Question<'_> {
+    /// The inputs as the shader takes them; the second result says which may be moved, and by how much.
+    fn pack(&self, probe: &Probe, out: &mut Vec<f32>) {
+        let prepared = self.method.prepare(self.reflection, probe.finish.gloss);
+        let Finish { diffuse, specular, gloss } = probe.finish;
+        let gloss = gloss.get() as f32;
+        let base = self.reflection.lobe.base() as f32;
+        out.extend([base, self.reflection.model.index() as f32, f32::from(probe.at_means), gloss]);
+        out.extend(diffuse.as_vec3().extend(gloss).to_array());
+        out.extend(specular.as_vec3().extend(0.0).to_array());
+        out.extend(probe.wi.extend(0.0).to_array());
+        out.extend(probe.wo.extend(0.0).to_array());
+        out.extend(probe.normal.extend(0.0).to_array());
+        out.extend(prepared.table().as_flattened());
+        out.extend(&probe.channels);
+    }
+
+    /// The eight numbers by the CPU.
+    fn answer(&self, probe: &Probe) -> [f64; 8] {
+        let Probe { finish, wi, wo, normal, at_means, channels } = probe;
+        let lobe = &self.reflection.lobe;
+        let way = Way::new(wi.as_dvec3(), wo.as_dvec3()).unwrap();
+        let prepared = self.method.prepare(self.reflection, finish.gloss);
+        let texel =
+            FilteredTexel { channels, finish: &|_| *finish, prepared: &prepared, at_means: *at_means };
+        let light =
+            self.method.reflect(&texel, self.reflection, &[Lit { way, irradiance: DVec3::ONE }]).to_array();
+        let facet = self.reflection.facet(normal.as_dvec3(), finish, &way).x;
+        let width = self.reflection.width(finish.gloss);
+        let specular = self.reflection.is_specular();
+        let of_lobe = |v: f64| if specular { v } else { 0.0 };
+        let masking = if specular { lobe.masking(way.wo.z, width) } else { 1.0 };
+        let lambert = brdf::Lambert::SHARP;
+        use brdf::Brdf;
+        [
+            light[0],
+            light[1],
+            light[2],
+            facet,
+            of_lobe(lobe.evaluate_widened(finish.gloss, normal.z.into())),
+            of_lobe(width.get()),
+            masking,
+            lambert.evaluate_widened(finish.gloss, way.wi.z),
+        ]
+    }
+
+    /// What the answer may be off by.
+    fn allowed(&self, probe: &Probe, answer: &[f64; 8]) -> [f64; 8] {
+        let mut allowed = answer.map(|a| RELATIVE * a.abs() + 1e-30);
+        let mut moved = |other: Probe| {
+            let changed = self.answer(&other);
+            for ((allowed, a), b) in allowed.iter_mut().zip(answer).zip(changed) {
+                *allowed += (a - b).abs();
+            }
+        };
+        for axis in Vec3::AXES {
+            moved(Probe { wi: probe.wi + axis * INPUT_STEP, ..probe.clone() });
+            moved(Probe { normal: probe.normal + axis * INPUT_STEP, ..probe.clone() });
+            moved(Probe { wo: probe.wo + axis * INPUT_STEP, ..probe.clone() });
+        }
+        for (layer, four) in probe.channels.as_chunks::<4>().0.iter().enumerate() {
+            let largest = four.iter().fold(0.0_f32, |m, c| m.max(c.abs()));
+            for k in 0..4 {
+                let mut other = probe.clone();
+                other.channels[4 * layer + k] += INPUT_STEP * largest;
+                moved(other);
+            }
+        }
+        let specular = probe.finish.specular * (1.0 - f64::from(INPUT_STEP));
+        moved(Probe { finish: Finish { specular, ..probe.finish }, ..probe.clone() });
+        let gloss = SlopeVariance::clamped(probe.finish.gloss.get() * (1.0 + f64::from(INPUT_STEP)));
+        moved(Probe { finish: Finish { gloss, ..probe.finish }, ..probe.clone() });
+        allowed
+    }
+}
+
+/// The outputs, in order, for messages.
+const NAMES: [&str; 8] = ["red", "green", "blue", "facet", "evaluate", "variance", "masking", "lambert"];
+
+/// Compares; returns the share of outputs within [`RELATIVE`] without the second allowance.
+fn compare(device: &Device, question: &Question<'_>, probes: &[Probe]) -> f64 {
+    let name = format!(
+        "{} with {} and {}",
+        question.method.spelling(),
+        question.reflection.lobe.spelling(),
+        question.reflection.model.name()
+    );
+    let text = shader::link(question.method, &*question.reflection.lobe, 0) + include_str!("parity.wgsl");
+    let mut input = Vec::new();
+    probes.iter().for_each(|p| question.pack(p, &mut input));
+    let count = probes.len() as u32;
+    let output = device.compute(&text, bytemuck::cast_slice(&input), 32 * u64::from(count), count);
+    let output = output.unwrap_or_else(|e| panic!("{name}: {e}"));
+    let output: Vec<f32> = bytemuck::pod_collect_to_vec(&output);
+    let (mut within, mut all) = (0, 0);
+    for (i, (probe, got)) in probes.iter().zip(output.as_chunks::<8>().0).enumerate() {
+        let answer = question.answer(probe);
+        let plain = |k: usize| (f64::from(got[k]) - answer[k]).abs() <= RELATIVE * answer[k].abs() + 1e-30;
+        all += 8;
+        let exact = (0..8).filter(|k| plain(*k)).count();
+        within += exact;
+        if exact == 8 {
+            continue;
+        }
+        let allowed = question.allowed(probe, &answer);
+        for k in 0..8 {
+            let error = (f64::from(got[k]) - answer[k]).abs();
+            assert!(
+                error <= allowed[k],
+                "{name}, probe {i}, {}: {} for {}, off by {error:e}, allowed {:e}\n{probe:?} way {:?} lobe {:e}",
+                NAMES[k],
+                got[k],
+                answer[k],
+                allowed[k],
+                Way::new(probe.wi.as_dvec3(), probe.wo.as_dvec3()),
+                answer[4]
+            );
+        }
+    }
+    f64::from(within as u32) / f64::from(all as u32)
+}
+
+fn reflection(lobe: &str, model: Model) -> Reflection {
+    Reflection { lobe: brdf::parse(lobe).unwrap(), model }
+}
+
+#[test]
+fn every_method_agrees() {
+    let Some(device) = device() else { return };
+    for (at, spelling) in ndf::TABLE.iter().flat_map(|row| row.samples).enumerate() {
+        let method = ndf::parse(spelling).unwrap();
+        let probes = probes(&*method, 500);
+        for (k, lobe) in ["blinn-phong:50", "ggx:0.2"].into_iter().enumerate() {
+            let reflection = reflection(lobe, Model::ALL[(at + k) % 3]);
+            let share = compare(&device, &Question { method: &*method, reflection: &reflection }, &probes);
+            eprintln!("{spelling} {lobe}: {:.2} % within 1e-5", 100.0 * share);
+        }
+    }
+}
+
+#[test]
+fn every_lobe_agrees_in_every_model() {
+    let Some(device) = device() else { return };
+    let method = ndf::parse("vmf:4").unwrap();
+    let probes = probes(&*method, 2000);
+    for spelling in brdf::TABLE.iter().flat_map(|row| row.samples) {
+        for model in Model::ALL {
+            let reflection = reflection(spelling, model);
+            let share = compare(&device, &Question { method: &*method, reflection: &reflection }, &probes);
+            eprintln!("{spelling} {}: {:.2} % within 1e-5", model.name(), 100.0 * share);
+        }
+    }
+}

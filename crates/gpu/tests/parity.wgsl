@@ -1,0 +1,39 @@
+// Evaluates the twins at given inputs: `reflect_texel` as a whole, and the functions of a lobe one by one.
+
+const HEAD: u32 = 6u;
+const STRIDE: u32 = HEAD + TABLE + ALL_LAYERS;
+
+@group(0) @binding(0) var<storage, read> input: array<vec4<f32>>;
+@group(0) @binding(1) var<storage, read_write> output: array<vec4<f32>>;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    let i = id.x + id.y * 65536u;
+    if i * STRIDE >= arrayLength(&input) {
+        return;
+    }
+    let first = i * STRIDE;
+    let a = input[first];
+    let b = input[first + 1u];
+    let c = input[first + 2u];
+    var reflection = Reflection(a.x, u32(a.y), u32(a.z), a.w, array<vec4<f32>, TABLE>());
+    for (var k = 0u; k < TABLE; k++) {
+        reflection.table[k] = input[first + HEAD + k];
+    }
+    var channels: Channels;
+    for (var k = 0u; k < ALL_LAYERS; k++) {
+        channels[k] = input[first + HEAD + TABLE + k];
+    }
+    let way = way_between(input[first + 3u].xyz, input[first + 4u].xyz);
+    let plain = Finish(b.xyz, b.w, c.xyz);
+    var decoded = decode(&channels);
+    let light = reflect_texel(&channels, &decoded, plain, reflection, way);
+    output[2u * i] = vec4<f32>(light, facet(reflection, input[first + 5u].xyz, plain, way).x);
+    let widened = brdf_widen(a.x, b.w);
+    output[2u * i + 1u] = vec4<f32>(
+        brdf_evaluate(widened, input[first + 5u].z),
+        brdf_variance(widened),
+        brdf_masking(way.wo.z, brdf_variance(widened)),
+        lambert_evaluate(b.w, way.wi.z),
+    );
+}

@@ -1,0 +1,142 @@
+//! Whole pictures: the GPU's are the CPU's, for every method, and so is its truth.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
+
+mod common;
+
+use common::device;
+use ndfmap_core::grid::Size;
+use ndfmap_core::lookup::Filtering;
+use ndfmap_core::metrics::{Picture, display, relative_l2};
+use ndfmap_core::ndf;
+use ndfmap_core::pyramid::Precision;
+use ndfmap_core::scene::{self, Scene, Staging};
+use ndfmap_gpu::{Canvas, FinestMaps, Geometry, Lookups, Maps, Outlines, Renderer, Sampling, Shown};
+use ndfmap_trace::filtered::{self, BakedMaps, Filtered};
+use ndfmap_trace::truth::{Effort, Truth};
+
+/// A display value may be off by one step of a byte.
+const STEP: f32 = 1.0 / 255.0;
+
+/// Pixels that may be off by more: those in which a triangle's edge passes so near a sample that a rasteriser and a ray
+/// decide otherwise, and those where the number of taps, a whole number, differs for a last digit.
+const MAY_DIFFER: f64 = 1e-3;
+
+fn staged(name: &str, time: f64, map: usize) -> Scene {
+    let size = Size { width: map, height: map };
+    (scene::find(name).unwrap().build)(&Staging { time, map_size: size, map: None })
+}
+
+/// Share of pixels with a display value that is off by more than [`STEP`].
+fn off(a: &Picture, b: &Picture, exposure: f32) -> f64 {
+    let far = |(a, b): &(&glam::Vec3, &glam::Vec3)| {
+        (display(**a, exposure) - display(**b, exposure)).abs().max_element() > STEP
+    };
+    a.texels().iter().zip(b.texels()).filter(far).count() as f64 / a.texels().len() as f64
+}
+
+#[test]
+fn every_method_draws_what_the_cpu_draws() {
+    let Some(device) = device() else { return };
+    let (renderer, size) = (Renderer::new(&device), Size { width: 240, height: 200 });
+    let canvas = Canvas::new(&device, size, Outlines::Parts).unwrap();
+    let scenes = [("disk", 0.4), ("armour", 0.3), ("plane", 0.0)];
+    let scenes = scenes.map(|(name, time)| (name, staged(name, time, 128)));
+    let methods = ndf::TABLE.iter().flat_map(|row| &row.samples[..1]);
+    let methods = methods.copied().chain(["ndm:plane", "sh:7", "vmf:4:unaligned", "gmm:4:prior"]);
+    let mut failed = Vec::new();
+    for spelling in methods {
+        let method = ndf::parse(spelling).unwrap();
+        for (name, scene) in &scenes {
+            let ours = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
+            let theirs = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
+            let on_cpu = ndfmap_trace::Geometry::new(scene);
+            let on_gpu = Geometry::new(&device, scene).unwrap();
+            let shown = Shown { scene, geometry: &on_gpu, camera: &scene.camera };
+            let traced = Filtered { scene, geometry: &on_cpu, maps: &theirs, progress: &|_| () };
+            for (filtering, neighbours) in
+                [(Filtering::TRILINEAR, false), (Filtering::anisotropic(8), spelling.contains("unaligned"))]
+            {
+                let lookups = Lookups { sampling: Sampling::Taps(filtering), neighbours, at_means: false };
+                renderer.draw(&canvas, &shown, &ours, lookups).unwrap();
+                let drawn = canvas.read().unwrap();
+                let lookups = filtered::Lookups { filtering, neighbours, at_means: false };
+                let traced = traced.render(&scene.camera, size, lookups);
+                let share = off(&drawn, &traced, scene.exposure);
+                eprintln!("{spelling} {name} {} taps: {share:.5} off", filtering.max_taps);
+                if share > MAY_DIFFER {
+                    failed.push((spelling, *name, share));
+                }
+            }
+        }
+    }
+    assert!(failed.is_empty(), "{failed:?}");
+}
+
+#[test]
+fn the_truth_is_the_truth() {
+    let Some(device) = device() else { return };
+    let (renderer, size) = (Renderer::new(&device), Size { width: 120, height: 100 });
+    let sharp = Canvas::new(&device, size, Outlines::Sharp).unwrap();
+    let parts = Canvas::new(&device, size, Outlines::Parts).unwrap();
+    let method = ndf::parse("vmf:4").unwrap();
+    for (name, time) in [("disk", 0.2), ("armour", 0.5), ("v-groove", 0.5)] {
+        let scene = staged(name, time, 128);
+        let on_gpu = Geometry::new(&device, &scene).unwrap();
+        let shown = Shown { scene: &scene, geometry: &on_gpu, camera: &scene.camera };
+        let finest = FinestMaps::new(&device, &scene.materials).unwrap();
+        let ours = renderer
+            .truth(&sharp, &shown, &finest, &ndfmap_gpu::Effort { samples: 512, progress: &|_| () })
+            .unwrap();
+        let on_cpu = ndfmap_trace::Geometry::new(&scene);
+        let truth = Truth::new(&scene, &on_cpu);
+        let theirs = truth.render(&scene.camera, size, &Effort { rays: 512, noise: 0.0, seed: 3 }, &|_| ());
+        let apart = relative_l2(&ours.picture, &theirs.picture);
+        let expected = ours.noise.hypot(theirs.noise);
+        // The noise of both is itself known to a tenth or so, from one difference of halves over 12 000 pixels of uneven weight.
+        assert!(apart < 1.25 * expected, "{name}: {apart} apart, noise {} and {}", ours.noise, theirs.noise);
+        // A bias would stand out of the noise in the mean over all pixels, which has a hundredth of it.
+        let mean =
+            |p: &Picture| p.texels().iter().sum::<glam::Vec3>().element_sum() / p.texels().len() as f32;
+        let ratio = f64::from(mean(&ours.picture) / mean(&theirs.picture));
+        assert!((ratio - 1.0).abs() < 5.0 * expected / 100.0, "{name}: means are {ratio} apart");
+        // Errors of a method are the same on both devices, to the noise of either truth.
+        let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
+        let taps = Sampling::Taps(Filtering::fine(16));
+        let lookups = Lookups { sampling: taps, neighbours: false, at_means: false };
+        renderer.draw(&parts, &shown, &maps, lookups).unwrap();
+        let drawn = relative_l2(&parts.read().unwrap(), &ours.picture);
+        let maps = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
+        let traced = Filtered { scene: &scene, geometry: &on_cpu, maps: &maps, progress: &|_| () };
+        let lookups =
+            filtered::Lookups { filtering: Filtering::fine(16), neighbours: false, at_means: false };
+        let traced = relative_l2(&traced.render(&scene.camera, size, lookups), &theirs.picture);
+        eprintln!(
+            "{name}: apart {apart:.4}, noise {expected:.4}; vmf:4 is off by {drawn:.4} and {traced:.4}"
+        );
+        assert!((drawn - traced).abs() < expected, "{name}: {drawn} and {traced}");
+    }
+}
+
+#[test]
+fn the_sampler_is_near_our_taps() {
+    // What samplers do is their own business; but one that is far from a plain trilinear filter would be a bug of ours.
+    let Some(device) = device() else { return };
+    let (renderer, size) = (Renderer::new(&device), Size { width: 200, height: 200 });
+    let scene = staged("disk", 0.3, 256);
+    let method = ndf::parse("vmf:4").unwrap();
+    let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
+    let geometry = Geometry::new(&device, &scene).unwrap();
+    let shown = Shown { scene: &scene, geometry: &geometry, camera: &scene.camera };
+    let canvas = Canvas::new(&device, size, Outlines::Multisampled).unwrap();
+    let draw = |sampling| {
+        renderer.draw(&canvas, &shown, &maps, Lookups { sampling, ..Lookups::TRILINEAR }).unwrap();
+        canvas.read().unwrap()
+    };
+    let ours = draw(Sampling::Taps(Filtering::TRILINEAR));
+    let theirs = draw(Sampling::Sampler(1));
+    let apart = relative_l2(&theirs, &ours);
+    eprintln!("sampler and taps are {apart:.4} apart");
+    // Samplers may take the longer of a pixel's two sides for its reach and mix levels over half the way only: a few hundredths.
+    assert!(apart < 0.1, "{apart}");
+}
