@@ -104,6 +104,15 @@ fn pair(t: f32, n: u32, repeat: bool) -> Pair {
     return Pair(clamp(first, 0, count - 1), clamp(first + 1, 0, count - 1), at - low);
 }
 
+// Levels of a map, which go down to one texel. (OpenGL ES 3.0 cannot be asked.)
+fn level_count(finest: vec2<u32>) -> u32 {
+    var levels = 1u;
+    for (var side = max(finest.x, finest.y); side > 1u; side >>= 1u) {
+        levels++;
+    }
+    return levels;
+}
+
 // A texel that a filter reads; shares sum to one.
 struct Neighbour {
     texel: vec2<i32>,
@@ -116,9 +125,10 @@ fn neighbour(map: texture_2d_array<f32>, uv: vec2<f32>, lod: f32, repeat: vec2<b
     let coarser = i / 4u;
     let level = u32(floor(lod)) + coarser;
     let share = select(1.0 - fract(lod), fract(lod), coarser == 1u);
-    let held = min(level, textureNumLevels(map) - 1u);
+    let finest = textureDimensions(map);
+    let held = min(level, level_count(finest) - 1u);
     // Asked for the size of a level that differs from pixel to pixel, lavapipe answers with another pixel's.
-    let size = max(textureDimensions(map) >> vec2<u32>(held), vec2<u32>(1u));
+    let size = max(finest >> vec2<u32>(held), vec2<u32>(1u));
     let x = pair(uv.x, size.x, repeat.x);
     let y = pair(uv.y, size.y, repeat.y);
     let right = (i & 1u) == 1u;

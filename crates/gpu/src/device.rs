@@ -48,10 +48,8 @@ impl Device {
         let (first, adapter) = (failure.clone(), name.clone());
         device.on_uncaptured_error(Arc::new(move |e| note(&first, error_of(&adapter, &e))));
         let (first, adapter) = (failure.clone(), name.clone());
-        device.set_device_lost_callback(move |reason, message| {
-            if reason != wgpu::DeviceLostReason::Destroyed {
-                note(&first, GpuError::Lost { adapter: adapter.clone(), reason: message });
-            }
+        device.set_device_lost_callback(move |_, message| {
+            note(&first, GpuError::Lost { adapter: adapter.clone(), reason: message });
         });
         let software = info.device_type == wgpu::DeviceType::Cpu;
         Ok(Self { device, queue, name, backend: info.backend, software, failure })

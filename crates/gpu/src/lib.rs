@@ -6,6 +6,7 @@
 mod canvas;
 mod device;
 mod error;
+pub mod export;
 mod geometry;
 pub mod link;
 mod maps;

@@ -48,7 +48,7 @@ fn shade(place: Place, channels: ptr<function, Channels>, plain: Finish) -> vec3
 
 fn taps_of(place: Place) -> Taps {
     var filtering = view.filtering;
-    filtering.levels = textureNumLevels(map);
+    filtering.levels = level_count(textureDimensions(map));
     return taps(PixelFootprint(place.uv, place.duv_dx, place.duv_dy), material.texels, filtering);
 }
 
@@ -116,12 +116,12 @@ fn neighbours(in: Varying) -> @location(0) vec4<f32> {
     let repeat = vec2<bool>((material.repeat & 1u) != 0u, (material.repeat & 2u) != 0u);
     let count = around.columns * around.rows;
     var sum = vec3<f32>(0.0);
+    var channels: Channels;
     for (var i = 0u; i < count; i++) {
         let uv = tap(around, i);
         for (var k = 0u; k < 8u; k++) {
             let n = neighbour(map, uv, around.lod, repeat, k);
             if n.weight > 0.0 {
-                var channels: Channels;
                 for (var layer = 0u; layer < ALL_LAYERS; layer++) {
                     channels[layer] = textureLoad(map, n.texel, layer, n.level);
                 }

@@ -1,0 +1,228 @@
+//! Shaders for other programs: decoding and shading of one method with one lobe, in the languages of others.
+//!
+//! In [`TABLE`] a row is a language. WGSL is our own text, comments and all; the others are written by naga from the same text, as a
+//! library of functions whose names begin with `ndf_`, so that they stand in an engine's own shader without a clash. SPIR-V is no text
+//! to include: it is a whole fragment shader.
+
+use std::fmt::Write as _;
+
+use naga::back;
+use naga::compact::{KeepUnused, compact};
+use ndfmap_core::ndf::Method;
+use ndfmap_core::reflection::Reflection;
+use ndfmap_core::shader::{self, LOOKUP};
+use ndfmap_core::units::SlopeVariance;
+
+use crate::GpuError;
+use crate::link::{Linked, check};
+
+/// A row of [`TABLE`].
+pub struct Language {
+    /// As spelled on the command line.
+    pub name: &'static str,
+    /// One line for help and docs.
+    pub summary: &'static str,
+    /// What a line of comment begins with; `None` for what is no text.
+    comment: Option<&'static str>,
+    /// Writes a linked library.
+    write: fn(&Linked) -> Result<Vec<u8>, String>,
+}
+
+/// Every language there is.
+pub static TABLE: &[Language] = &[
+    Language {
+        name: "wgsl",
+        summary: "WebGPU Shading Language: our own text, with its comments",
+        comment: Some("//"),
+        write: |linked| Ok(linked.text.clone().into_bytes()),
+    },
+    Language {
+        name: "glsl",
+        summary: "GLSL 4.50, to be included after `#version`",
+        comment: Some("//"),
+        write: |linked| glsl(linked, back::glsl::Version::Desktop(450), ""),
+    },
+    Language {
+        name: "glsl-es",
+        summary: "GLSL ES 3.00 (WebGL 2), to be included after `#version`",
+        comment: Some("//"),
+        write: |linked| glsl(linked, back::glsl::Version::new_gles(300), ES_PRECISION),
+    },
+    Language { name: "hlsl", summary: "HLSL, shader model 5.1 and up", comment: Some("//"), write: hlsl },
+    Language { name: "msl", summary: "Metal Shading Language 2.4", comment: Some("//"), write: msl },
+    Language {
+        name: "spirv",
+        summary: "SPIR-V 1.3: a fragment shader `main`, map and sampler at set 0, bindings 0 and 1",
+        comment: None,
+        write: spirv,
+    },
+];
+
+/// A shader to be exported.
+pub struct Export<'a> {
+    /// The method, whose baked map the shader reads.
+    pub method: &'a dyn Method,
+    /// Lobe and model.
+    pub reflection: &'a Reflection,
+}
+
+impl Export<'_> {
+    /// The shader in a language.
+    ///
+    /// # Errors
+    /// [`GpuError::Shader`] when the language cannot say it.
+    pub fn to(&self, language: &Language) -> Result<Vec<u8>, GpuError> {
+        let library = self.library();
+        // Text that is handed out as it is needs no entry point; naga wants one, to see what is used.
+        let entry = include_str!("entry.wgsl");
+        let linked = if language.name == "wgsl" { check(library)? } else { check(library + "\n" + entry)? };
+        let body = (language.write)(&linked)
+            .map_err(|e| GpuError::Shader(format!("{} cannot say it: {e}", language.name)))?;
+        let Some(comment) = language.comment else { return Ok(body) };
+        let head: String = self.head().lines().fold(String::new(), |mut head, line| {
+            // Writing to a string cannot fail.
+            let _ = writeln!(head, "{comment} {line}");
+            head
+        });
+        Ok([head.into_bytes(), body].concat())
+    }
+
+    /// The linked text of the library, without an entry point.
+    fn library(&self) -> String {
+        let lobe = &*self.reflection.lobe;
+        let table = self.method.prepare(self.reflection, SlopeVariance::ZERO).table();
+        let entry = |(i, [lobe, diffuse, ..]): (usize, &[f32; 4])| {
+            format!("    reflection.table[{i}] = vec4<f32>({lobe:?}, {diffuse:?}, 0.0, 0.0);\n")
+        };
+        let reflection = format!(
+            "// The lobe {}, in the model `{}`.\nfn ndf_reflection() -> Reflection {{\n    var reflection: Reflection;\n    \
+             reflection.base = {:?};\n    reflection.model = {}u;\n{}    return reflection;\n}}\n",
+            lobe.spelling(),
+            self.reflection.model.name(),
+            lobe.base() as f32,
+            self.reflection.model.index(),
+            table.iter().enumerate().map(entry).collect::<String>()
+        );
+        let method = shader::link(self.method, lobe, 0);
+        let library = include_str!("library.wgsl");
+        let filtered = self.method.filterable();
+        let (lookup, own) = if filtered {
+            ("", include_str!("filtered.wgsl"))
+        } else {
+            (LOOKUP, include_str!("texels.wgsl"))
+        };
+        [&method, lookup, &reflection, library, own].join("\n")
+    }
+
+    /// What the file begins with.
+    fn head(&self) -> String {
+        let (layers, method) = (self.method.layers(), self.method.spelling());
+        let (lobe, model) = (self.reflection.lobe.spelling(), self.reflection.model.name());
+        format!(
+            "Normal distribution map, method {method}, lobe {lobe}, model {model}. Made by ndfmap {}.\n\
+             \n\
+             Bind the map that `ndfmap bake --method {method}` made as a 2-D array texture of {layers} layers, half floats, with all\n\
+             its levels and no sRGB decoding, and a sampler that filters linearly on all three axes. Then call\n\
+             \n    ndf_shade(map, sampler, uv, place)\n\n\
+             with uv from 0 to 1 over the map, v down its rows, and a place in the tangent frame (x along u, y against v, z out):\n\
+             unit vectors to light and eye, albedo, reflectance at normal incidence. It returns the radiance to the eye, for each\n\
+             unit of the light's irradiance on a plane that faces it. Call it once a light, and add.",
+            env!("CARGO_PKG_VERSION")
+        )
+    }
+}
+
+/// The module with names that clash with nobody's, and nothing that is not used.
+fn private(linked: &Linked) -> Result<(naga::Module, naga::valid::ModuleInfo), String> {
+    let mut module = linked.module.clone();
+    compact(&mut module, KeepUnused::No);
+    let own = |name: &mut Option<String>| {
+        if let Some(name) = name
+            && !name.to_lowercase().starts_with("ndf")
+        {
+            name.insert_str(0, "ndf_");
+        }
+    };
+    module.functions.iter_mut().for_each(|(_, function)| own(&mut function.name));
+    module.constants.iter_mut().for_each(|(_, constant)| own(&mut constant.name));
+    let types: Vec<_> = module.types.iter().map(|(handle, ty)| (handle, ty.clone())).collect();
+    for (handle, mut ty) in types {
+        let before = ty.name.clone();
+        own(&mut ty.name);
+        if ty.name != before {
+            module.types.replace(handle, ty);
+        }
+    }
+    let flags = naga::valid::ValidationFlags::all();
+    let info = naga::valid::Validator::new(flags, naga::valid::Capabilities::default())
+        .validate(&module)
+        .map_err(|e| e.to_string())?;
+    Ok((module, info))
+}
+
+/// The same as a library: without the entry point, which only told what is used, and what it binds.
+fn library(linked: &Linked) -> Result<(naga::Module, naga::valid::ModuleInfo), String> {
+    let (mut module, _) = private(linked)?;
+    module.entry_points.clear();
+    // Nothing but the entry point refers to bindings.
+    module.global_variables = naga::Arena::new();
+    let flags = naga::valid::ValidationFlags::all();
+    let info = naga::valid::Validator::new(flags, naga::valid::Capabilities::default())
+        .validate(&module)
+        .map_err(|e| e.to_string())?;
+    Ok((module, info))
+}
+
+/// What GLSL ES has no default for.
+const ES_PRECISION: &str = "precision highp sampler2DArray;\n";
+
+fn glsl(linked: &Linked, version: back::glsl::Version, before: &str) -> Result<Vec<u8>, String> {
+    let (module, info) = private(linked)?;
+    let mut text = String::new();
+    let options = back::glsl::Options { version, ..back::glsl::Options::default() };
+    let pipeline = back::glsl::PipelineOptions {
+        shader_stage: naga::ShaderStage::Fragment,
+        entry_point: "main".to_owned(),
+        multiview: None,
+    };
+    let policies = naga::proc::BoundsCheckPolicies::default();
+    back::glsl::Writer::new(&mut text, &module, &info, &options, &pipeline, policies)
+        .and_then(|mut writer| writer.write())
+        .map_err(|e| e.to_string())?;
+    // The functions alone: what comes before `main`, less the version, and less what only `main` binds, reads and writes.
+    let functions = text.split("void main()").next().unwrap_or_default();
+    let own = |line: &&str| {
+        let bound = ["#version", "uniform ", "layout(", "smooth in ", "in ", "out "];
+        !bound.iter().any(|word| line.trim_start().starts_with(word))
+    };
+    let functions = functions.lines().filter(own).collect::<Vec<_>>().join("\n");
+    Ok(format!("{before}{functions}\n").into_bytes())
+}
+
+fn hlsl(linked: &Linked) -> Result<Vec<u8>, String> {
+    let (module, info) = library(linked)?;
+    let mut text = String::new();
+    let options =
+        back::hlsl::Options { shader_model: back::hlsl::ShaderModel::V5_1, ..back::hlsl::Options::default() };
+    let pipeline = back::hlsl::PipelineOptions::default();
+    back::hlsl::Writer::new(&mut text, &options, &pipeline)
+        .write(&module, &info, None)
+        .map_err(|e| e.to_string())?;
+    Ok(text.into_bytes())
+}
+
+fn msl(linked: &Linked) -> Result<Vec<u8>, String> {
+    let (module, info) = library(linked)?;
+    let options = back::msl::Options { lang_version: (2, 4), ..back::msl::Options::default() };
+    let pipeline = back::msl::PipelineOptions::default();
+    let (text, _) =
+        back::msl::write_string(&module, &info, &options, &pipeline).map_err(|e| e.to_string())?;
+    Ok(text.into_bytes())
+}
+
+fn spirv(linked: &Linked) -> Result<Vec<u8>, String> {
+    let (module, info) = private(linked)?;
+    let options = back::spv::Options { lang_version: (1, 3), ..back::spv::Options::default() };
+    let words = back::spv::write_vec(&module, &info, &options, None).map_err(|e| e.to_string())?;
+    Ok(words.iter().flat_map(|word| word.to_le_bytes()).collect())
+}
