@@ -32,8 +32,8 @@ impl Device {
             power_preference: wgpu::PowerPreference::HighPerformance,
             ..wgpu::RequestAdapterOptions::default()
         };
-        let adapter = pollster::block_on(instance.request_adapter(&options))
-            .map_err(|e| GpuError::NoAdapter(e.to_string()))?;
+        let adapter =
+            pollster::block_on(instance.request_adapter(&options)).map_err(|_| GpuError::NoAdapter)?;
         let info = adapter.get_info();
         let name = info.name.clone();
         let descriptor = wgpu::DeviceDescriptor {

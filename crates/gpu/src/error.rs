@@ -4,8 +4,10 @@
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GpuError {
     /// No adapter, not even a software one.
-    #[error("there is no GPU that can be used, and no software Vulkan (Mesa's lavapipe is one): {0}")]
-    NoAdapter(String),
+    #[error(
+        "there is no GPU that can be used, and no software one (such as lavapipe, package mesa-vulkan-drivers)"
+    )]
+    NoAdapter,
     /// The adapter gave no device.
     #[error("{adapter} cannot be opened: {reason}")]
     NoDevice {

@@ -7,12 +7,13 @@ use ndfmap_core::metrics::{Picture, change, color_error, relative_l2};
 use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::Scene;
-use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
+use ndfmap_trace::filtered::Lookups;
 use ndfmap_trace::truth::{Effort, Truth};
 use ndfmap_trace::{DRIFT_FRAMES, Geometry, drifted};
 use serde_json::{Map, Value, json};
 
 use crate::Failure;
+use crate::engine::{Drawn, Engine, View};
 use crate::progress::Progress;
 use crate::staging::Stage;
 
@@ -76,10 +77,13 @@ pub(crate) struct Reel {
     pub(crate) frames: Vec<Frame>,
     pub(crate) methods: Vec<String>,
     pub(crate) bake_seconds: Vec<f64>,
+    /// What rendered, as JSON.
+    pub(crate) engine: Value,
 }
 
 /// Renders and measures; `each` gets every frame as it is done.
-pub(crate) fn shoot(
+pub(crate) fn shoot<E: Engine>(
+    engine: &E,
     shot: &Shot<'_>,
     each: &mut dyn FnMut(usize, &Frame) -> Result<(), Failure>,
 ) -> Result<Reel, Failure> {
@@ -88,7 +92,7 @@ pub(crate) fn shoot(
     for method in shot.methods {
         let start = Instant::now();
         let progress = Progress::new(&format!("bake {}", method.spelling()));
-        baked.push(BakedMaps::new(&first.materials, &**method, shot.precision, &|f| progress.set(f)));
+        baked.push(engine.bake(&first.materials, &**method, shot.precision, &|f| progress.set(f))?);
         bake_seconds.push(start.elapsed().as_secs_f64());
     }
     let mut frames = Vec::new();
@@ -97,7 +101,7 @@ pub(crate) fn shoot(
         if at > 0 && shot.stage.moves() {
             scene = shot.stage.set(*time)?;
         }
-        let mut frame = frame(shot, &scene, *time, &baked);
+        let mut frame = frame(engine, shot, (&scene, *time), &baked)?;
         each(at, &frame)?;
         if !shot.keep {
             frame.pictures = Vec::new();
@@ -105,48 +109,55 @@ pub(crate) fn shoot(
         frames.push(frame);
     }
     let methods = shot.methods.iter().map(|m| m.spelling()).collect();
-    Ok(Reel { frames, methods, bake_seconds })
+    Ok(Reel { frames, methods, bake_seconds, engine: engine.describe() })
 }
 
-fn frame(shot: &Shot<'_>, scene: &Scene, time: f64, baked: &[BakedMaps<'_>]) -> Frame {
+fn frame<E: Engine>(
+    engine: &E,
+    shot: &Shot<'_>,
+    (scene, time): (&Scene, f64),
+    baked: &[E::Maps<'_>],
+) -> Result<Frame, Failure> {
     let (size, exposure) = (shot.size, scene.exposure);
-    let geometry = Geometry::new(scene);
+    let set = engine.set(scene)?;
+    let view = View { scene, set: &set, camera: scene.camera, size };
     let start = Instant::now();
-    let brute = shot.truth.map(|effort| (Truth::new(scene, &geometry), effort));
-    let truth = brute.as_ref().map(|(truth, effort)| {
+    let brute = |effort: Effort| {
         let progress = Progress::new("truth");
-        truth.render(&scene.camera, size, effort, &|f| progress.set(f))
-    });
-    let seconds = start.elapsed().as_secs_f64();
-    let moving = |render: &dyn Fn(usize) -> Picture| {
-        let pictures: Vec<Picture> = (0..DRIFT_FRAMES).map(render).collect();
-        change(&pictures, exposure)
+        engine.truth(&view, &effort, &|f| progress.set(f))
     };
-    let drifting = brute.as_ref().filter(|_| shot.sparkle).map(|(truth, effort)| {
+    let truth = shot.truth.map(brute).transpose()?;
+    let seconds = start.elapsed().as_secs_f64();
+    // A drifting truth is rendered in one go, which only the CPU renderer knows.
+    let drifting = shot.truth.filter(|_| shot.sparkle).map(|effort| {
         let progress = Progress::new("truth, drifting");
+        let geometry = Geometry::new(scene);
+        let truth = Truth::new(scene, &geometry);
         true_change(&truth.drift(&scene.camera, size, effort.rays, &|f| progress.set(f)), exposure)
     });
-    let take = |maps: &BakedMaps<'_>| {
+    let take = |maps: &E::Maps<'_>| -> Result<(Take, Picture), Failure> {
         let progress = Progress::new("filtered");
-        let filtered = Filtered { scene, geometry: &geometry, maps, progress: &|f| progress.set(f) };
-        let start = Instant::now();
-        let picture = filtered.render(&scene.camera, size, shot.lookups);
-        let milliseconds = start.elapsed().as_secs_f64() * 1e3;
+        let draw = |view: &View<'_, E::Set>| engine.draw(view, maps, shot.lookups, &|f| progress.set(f));
+        let Drawn { picture, milliseconds } = draw(&view)?;
+        let sparkle = |drifting: Drifting| -> Result<f64, Failure> {
+            let moved = |i| draw(&View { camera: drifted(&scene.camera, i), ..view }).map(|d| d.picture);
+            let pictures = (0..DRIFT_FRAMES).map(moved).collect::<Result<Vec<Picture>, _>>()?;
+            Ok(change(&pictures, exposure) / drifting.change.max(f64::MIN_POSITIVE))
+        };
+        let sparkle = drifting.map(sparkle).transpose()?;
         let errors = truth.as_ref().map(|truth| Errors {
             relative_l2: relative_l2(&picture, &truth.picture),
             color_error: color_error(&picture, &truth.picture, exposure),
             flip: flip(&picture, &truth.picture, exposure),
-            sparkle: drifting.map(|drifting| {
-                let own = moving(&|i| filtered.render(&drifted(&scene.camera, i), size, shot.lookups));
-                own / drifting.change.max(f64::MIN_POSITIVE)
-            }),
+            sparkle,
         });
-        (Take { milliseconds, errors }, picture)
+        Ok((Take { milliseconds, errors }, picture))
     };
-    let (takes, taken): (Vec<Take>, Vec<Picture>) = baked.iter().map(take).unzip();
+    let takes = baked.iter().map(take).collect::<Result<Vec<_>, _>>()?;
+    let (takes, taken): (Vec<Take>, Vec<Picture>) = takes.into_iter().unzip();
     let told = truth.as_ref().map(|t| Told { rays: t.rays, noise: t.noise, seconds });
     let pictures = truth.map(|t| t.picture).into_iter().chain(taken).collect();
-    Frame { time, exposure, truth: told, drifting, takes, pictures }
+    Ok(Frame { time, exposure, truth: told, drifting, takes, pictures })
 }
 
 /// How much the truth changes over a drift: [`change`] of its display values.

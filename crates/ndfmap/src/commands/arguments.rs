@@ -5,6 +5,7 @@ use ndfmap_core::brdf::{self, ParseBrdfError};
 use ndfmap_core::grid::Size;
 use ndfmap_core::ndf::{self, Method, ParseMethodError};
 use ndfmap_core::pyramid;
+use ndfmap_core::reflection::Model;
 use ndfmap_core::scene;
 use ndfmap_core::surface::{SlopeFilter, Wrap, Wraps};
 use ndfmap_maps::SourceKind;
@@ -165,7 +166,8 @@ pub(super) fn scene_name(text: &str) -> Result<String, String> {
     Err(format!("{nearest}, and models: .{}", models.join(", .")))
 }
 
-fn unknown(name: &str, known: impl Iterator<Item = &'static str> + Clone) -> String {
+/// Says that a name is unknown, and which is nearest.
+pub(super) fn unknown(name: &str, known: impl Iterator<Item = &'static str> + Clone) -> String {
     // Below 0.7 the nearest is merely the least far.
     let near = known.clone().filter(|k| strsim::jaro_winkler(name, k) > 0.7);
     let nearest = near.max_by(|a, b| strsim::jaro_winkler(name, a).total_cmp(&strsim::jaro_winkler(name, b)));
@@ -201,4 +203,10 @@ pub(super) fn brdfs_help() -> String {
 /// The method of a checked spelling.
 pub(super) fn method(spelling: &str) -> Result<Box<dyn Method>, crate::Failure> {
     ndf::parse(spelling).map_err(|e| crate::Failure::Usage(e.to_string()))
+}
+
+/// Reads the name of a shading model.
+pub(super) fn model(text: &str) -> Result<Model, String> {
+    let names = Model::ALL.map(Model::name).join(", ");
+    Model::ALL.into_iter().find(|m| m.name() == text).ok_or_else(|| format!("`{text}` is none of {names}"))
 }

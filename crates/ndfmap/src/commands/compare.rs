@@ -19,6 +19,7 @@ use super::arguments::{
 use super::render::{FilterArguments, check_drift};
 use super::{print, print_json, say_if_replaced, warn};
 use crate::Failure;
+use crate::engine::Cpu;
 use crate::imaging::{Reel, Shot, shoot};
 use crate::measure::{self, Comparison, Subject};
 use crate::report::{self, Pages};
@@ -202,6 +203,6 @@ impl Run<'_> {
             sparkle: pictures.sparkle,
             keep: true,
         };
-        shoot(&shot, &mut |_, _| Ok(()))
+        shoot(&Cpu, &shot, &mut |_, _| Ok(()))
     }
 }

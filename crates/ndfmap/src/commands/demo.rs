@@ -18,6 +18,7 @@ use super::bake::header_of;
 use super::compare::{DEFAULT_METHODS, Measured, Run};
 use super::{print, print_json, say_if_replaced};
 use crate::Failure;
+use crate::engine::Cpu;
 use crate::imaging::{Shot, shoot};
 use crate::report::pictures;
 use crate::staging::Stage;
@@ -58,7 +59,7 @@ fn sheet(scene: &str, times: &[f64]) -> Result<Vec<u8>, Failure> {
         sparkle: false,
         keep: true,
     };
-    pictures::draw(&shoot(&shot, &mut |_, _| Ok(()))?, scene)
+    pictures::draw(&shoot(&Cpu, &shot, &mut |_, _| Ok(()))?, scene)
 }
 
 impl Demo {

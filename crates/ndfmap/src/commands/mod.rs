@@ -10,6 +10,8 @@ mod compare;
 mod demo;
 mod inspect;
 mod render;
+#[cfg(feature = "gpu")]
+mod shader;
 
 use std::path::Path;
 
@@ -46,6 +48,8 @@ enum Command {
     Inspect(inspect::Inspect),
     Compare(compare::Compare),
     Render(Box<render::Render>),
+    #[cfg(feature = "gpu")]
+    Shader(shader::Shader),
 }
 
 impl Program {
@@ -66,14 +70,21 @@ impl Program {
             Command::Inspect(command) => command.run(json),
             Command::Compare(command) => command.run(json),
             Command::Render(command) => command.run(json),
+            #[cfg(feature = "gpu")]
+            Command::Shader(command) => command.run(json),
         }
     }
 }
 
 /// Prints text, or JSON, on stdout; a reader that hung up is not our failure.
 fn print(text: &str) -> Result<(), Failure> {
+    print_bytes(format!("{}\n", text.trim_end_matches('\n')).as_bytes())
+}
+
+/// Writes bytes on stdout as they are.
+fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
     use std::io::Write;
-    match writeln!(std::io::stdout().lock(), "{}", text.trim_end_matches('\n')) {
+    match std::io::stdout().lock().write_all(bytes) {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
             Err(Failure::Failed(format!("cannot write to stdout: {e}")))
         }

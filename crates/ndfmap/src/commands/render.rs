@@ -18,11 +18,14 @@ use ndfmap_trace::truth::Effort;
 use serde_json::json;
 
 use super::arguments::{
-    Precision, SourceArguments, brdf_spelling, brdfs_help, method, method_spelling, methods_help, positive,
-    scene_name, size,
+    Precision, SourceArguments, brdf_spelling, brdfs_help, method, method_spelling, methods_help, model,
+    positive, scene_name, size,
 };
 use super::{print, print_json, say_if_replaced, warn};
 use crate::Failure;
+use crate::engine::Cpu;
+#[cfg(feature = "gpu")]
+use crate::engine::Gpu;
 use crate::imaging::{Frame, Reel, Shot, shoot};
 use crate::report::pictures::{self, Plan};
 use crate::staging::{CameraArgument, Stage};
@@ -94,6 +97,13 @@ pub(super) struct Render {
     /// What renders
     #[arg(long, value_enum, default_value_t = Device::Auto)]
     device: Device,
+    /// The GPU's own sampler filters maps in place of `--filter`: trilinear, or with up to TAPS taps
+    #[arg(long, value_name = "TAPS", num_args = 0..=1, default_missing_value = "1", conflicts_with_all = ["neighbours", "filter"],
+        value_parser = clap::value_parser!(u16).range(1..=16))]
+    sampler: Option<u16>,
+    /// The GPU smooths outlines by four samples a pixel, as applications do, in place of 4 x 4 parts
+    #[arg(long)]
+    multisample: bool,
     /// Bits of a stored channel
     #[arg(long, value_enum, default_value_t = Precision::Half)]
     precision: Precision,
@@ -132,23 +142,39 @@ impl FilterArguments {
     }
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Device {
-    /// The best there is: so far the processor
+    /// A GPU, where there is one that is not software; else the processor
     Auto,
     /// The processor
     Cpu,
+    /// A GPU, be it software
+    Gpu,
+}
+
+#[cfg(feature = "gpu")]
+impl Device {
+    /// The GPU to render on; `None` for the processor.
+    fn open(self) -> Result<Option<ndfmap_gpu::Device>, Failure> {
+        let opened = match self {
+            Self::Cpu => return Ok(None),
+            Self::Gpu => return Ok(Some(ndfmap_gpu::Device::open()?)),
+            Self::Auto => ndfmap_gpu::Device::open(),
+        };
+        let said = match opened {
+            Ok(device) if !device.is_software() => return Ok(Some(device)),
+            Ok(device) => format!("the only GPU is {}", device.description()),
+            Err(e) => e.to_string(),
+        };
+        eprintln!("ndfmap: {said}: rendering on the processor");
+        Ok(None)
+    }
 }
 
 fn scenes_help() -> String {
     let rows =
         scene::TABLE.iter().map(|r| format!("  {:13} {}; over time, {}", r.name, r.summary, r.animation));
     format!("Scenes:\n{}", rows.collect::<Vec<_>>().join("\n"))
-}
-
-fn model(text: &str) -> Result<Model, String> {
-    let names = Model::ALL.map(Model::name).join(", ");
-    Model::ALL.into_iter().find(|m| m.name() == text).ok_or_else(|| format!("`{text}` is none of {names}"))
 }
 
 fn time(text: &str) -> Result<f64, String> {
@@ -301,7 +327,7 @@ impl Render {
             }
         }
         let mut written = Vec::new();
-        let reel = shoot(&shot, &mut |at, frame| self.write(at, times.len(), frame, &mut written))?;
+        let reel = self.shoot(&shot, &mut |at, frame| self.write(at, times.len(), frame, &mut written))?;
         if let Some(sheet) = &self.compare {
             let title = format!("{}  {} x {}", self.scene, self.size.width, self.size.height);
             say_if_replaced(sheet);
@@ -316,6 +342,28 @@ impl Render {
         } else {
             print(&reel.to_table())
         }
+    }
+
+    /// Renders on the device that was asked for.
+    fn shoot(
+        &self,
+        shot: &Shot<'_>,
+        each: &mut dyn FnMut(usize, &Frame) -> Result<(), Failure>,
+    ) -> Result<Reel, Failure> {
+        #[cfg(feature = "gpu")]
+        if let Some(device) = self.device.open()? {
+            return shoot(&Gpu::new(&device, self.sampler, self.multisample), shot, each);
+        }
+        #[cfg(not(feature = "gpu"))]
+        if self.device == Device::Gpu {
+            let why = "this program was built without its feature `gpu`";
+            return Err(Failure::Usage(format!("--device gpu: {why}")));
+        }
+        if self.sampler.is_some() || self.multisample {
+            let why = "`--sampler` and `--multisample` are a GPU's";
+            return Err(Failure::Usage(format!("{why}: name it with `--device gpu`")));
+        }
+        shoot(&Cpu, shot, each)
     }
 
     fn stage(&self) -> Result<Stage, Failure> {
@@ -368,7 +416,7 @@ impl Render {
         let mut value = json!({
             "scene": self.scene,
             "method": reel.methods[0],
-            "device": "cpu",
+            "device": reel.engine["device"],
             "width": self.size.width,
             "height": self.size.height,
             "seconds": seconds,
@@ -381,6 +429,9 @@ impl Render {
             value["truth"] = truth;
         }
         value["methods"] = methods.into();
+        if let serde_json::Value::Object(engine) = &reel.engine {
+            engine.iter().for_each(|(key, said)| value[key.as_str()] = said.clone());
+        }
         value
     }
 }

@@ -1,0 +1,62 @@
+//! The processor renders: `ndfmap-trace`.
+
+use std::time::Instant;
+
+use ndfmap_core::ndf::Method;
+use ndfmap_core::pyramid::Precision;
+use ndfmap_core::scene::{Material, Scene};
+use ndfmap_trace::Geometry;
+use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
+use ndfmap_trace::truth::{Effort, TruePicture, Truth};
+use serde_json::{Value, json};
+
+use super::{Drawn, Engine, View};
+use crate::Failure;
+
+/// The processor.
+pub(crate) struct Cpu;
+
+impl Engine for Cpu {
+    type Maps<'a> = BakedMaps<'a>;
+    type Set = Geometry;
+
+    fn describe(&self) -> Value {
+        json!({ "device": "cpu" })
+    }
+
+    fn bake<'a>(
+        &'a self,
+        materials: &[Material],
+        method: &'a dyn Method,
+        precision: Precision,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<BakedMaps<'a>, Failure> {
+        Ok(BakedMaps::new(materials, method, precision, progress))
+    }
+
+    fn set(&self, scene: &Scene) -> Result<Geometry, Failure> {
+        Ok(Geometry::new(scene))
+    }
+
+    fn truth(
+        &self,
+        view: &View<'_, Geometry>,
+        effort: &Effort,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<TruePicture, Failure> {
+        Ok(Truth::new(view.scene, view.set).render(&view.camera, view.size, effort, progress))
+    }
+
+    fn draw(
+        &self,
+        view: &View<'_, Geometry>,
+        maps: &BakedMaps<'_>,
+        lookups: Lookups,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<Drawn, Failure> {
+        let filtered = Filtered { scene: view.scene, geometry: view.set, maps, progress };
+        let start = Instant::now();
+        let picture = filtered.render(&view.camera, view.size, lookups);
+        Ok(Drawn { picture, milliseconds: start.elapsed().as_secs_f64() * 1e3 })
+    }
+}

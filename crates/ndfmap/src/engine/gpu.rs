@@ -1,0 +1,115 @@
+//! A GPU renders: `ndfmap-gpu`.
+
+use ndfmap_core::ndf::Method;
+use ndfmap_core::pyramid::Precision;
+use ndfmap_core::scene::{Material, Scene};
+use ndfmap_gpu::{
+    Canvas, Device, Effort, FinestMaps, Geometry, GpuError, LEAST_SAMPLES, Lookups, Maps, Outlines, Renderer,
+    Sampling, Shown,
+};
+use ndfmap_trace::filtered;
+use ndfmap_trace::truth::{self, TruePicture};
+use serde_json::{Value, json};
+
+use super::{Drawn, Engine, View};
+use crate::Failure;
+
+/// A GPU, and how it draws.
+pub(crate) struct Gpu<'a> {
+    device: &'a Device,
+    renderer: Renderer<'a>,
+    /// The device's own sampler filters, with so many taps, in place of ours.
+    sampler: Option<u16>,
+    outlines: Outlines,
+}
+
+impl From<GpuError> for Failure {
+    fn from(error: GpuError) -> Self {
+        Self::Failed(format!("{error} (`--device cpu` renders without a GPU)"))
+    }
+}
+
+impl<'a> Gpu<'a> {
+    /// Prepares to draw on a device.
+    pub(crate) fn new(device: &'a Device, sampler: Option<u16>, multisample: bool) -> Self {
+        let outlines = if multisample { Outlines::Multisampled } else { Outlines::Parts };
+        Self { device, renderer: Renderer::new(device), sampler, outlines }
+    }
+
+    fn shown<'v>(view: &'v View<'_, Geometry>) -> Shown<'v> {
+        Shown { scene: view.scene, geometry: view.set, camera: &view.camera }
+    }
+}
+
+impl Engine for Gpu<'_> {
+    type Maps<'a>
+        = Maps<'a>
+    where
+        Self: 'a;
+    type Set = Geometry;
+
+    fn describe(&self) -> Value {
+        json!({
+            "device": "gpu",
+            "adapter": self.device.description(),
+            "clock": if self.device.has_timestamps() { "device" } else { "wall" },
+            "outlines": if self.outlines == Outlines::Parts { "parts" } else { "multisampled" },
+        })
+    }
+
+    fn bake<'a>(
+        &'a self,
+        materials: &[Material],
+        method: &'a dyn Method,
+        precision: Precision,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<Maps<'a>, Failure> {
+        Ok(Maps::new(self.device, materials, method, precision, progress)?)
+    }
+
+    fn set(&self, scene: &Scene) -> Result<Geometry, Failure> {
+        Ok(Geometry::new(self.device, scene)?)
+    }
+
+    fn truth(
+        &self,
+        view: &View<'_, Geometry>,
+        effort: &truth::Effort,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<TruePicture, Failure> {
+        let canvas = Canvas::new(self.device, view.size, Outlines::Sharp)?;
+        let finest = FinestMaps::new(self.device, &view.scene.materials)?;
+        let with = |samples| {
+            let effort = Effort { samples, progress };
+            self.renderer.truth(&canvas, &Self::shown(view), &finest, &effort)
+        };
+        // Where a noise is asked for: twice as many until it is reached.
+        let mut samples = if effort.noise > 0.0 { LEAST_SAMPLES.min(effort.rays) } else { effort.rays };
+        loop {
+            let truth = with(samples)?;
+            if truth.noise <= effort.noise || samples >= effort.rays {
+                return Ok(TruePicture { picture: truth.picture, rays: truth.samples, noise: truth.noise });
+            }
+            samples = (2 * samples).min(effort.rays);
+        }
+    }
+
+    fn draw(
+        &self,
+        view: &View<'_, Geometry>,
+        maps: &Maps<'_>,
+        lookups: filtered::Lookups,
+        _progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<Drawn, Failure> {
+        let filtered::Lookups { filtering, neighbours, at_means } = lookups;
+        let sampling = self.sampler.map_or(Sampling::Taps(filtering), Sampling::Sampler);
+        let lookups = Lookups { sampling, neighbours, at_means };
+        let canvas = Canvas::new(self.device, view.size, self.outlines)?;
+        let shown = Self::shown(view);
+        self.renderer.draw(&canvas, &shown, maps, lookups)?;
+        let picture = canvas.read()?;
+        // The picture's own passes made pipelines and read the result back: a frame like the next one tells what it takes.
+        let milliseconds = self.renderer.time(&canvas, &shown, maps, lookups)?;
+        Ok(Drawn { picture, milliseconds })
+    }
+}

@@ -1,0 +1,77 @@
+//! What renders: the processor, or a GPU. The same maps and scenes, the same pictures; see `docs/gpu.md`.
+
+mod cpu;
+#[cfg(feature = "gpu")]
+mod gpu;
+
+pub(crate) use cpu::Cpu;
+#[cfg(feature = "gpu")]
+pub(crate) use gpu::Gpu;
+
+use ndfmap_core::grid::Size;
+use ndfmap_core::metrics::Picture;
+use ndfmap_core::ndf::Method;
+use ndfmap_core::pyramid::Precision;
+use ndfmap_core::scene::{Camera, Material, Scene};
+use ndfmap_trace::filtered::Lookups;
+use ndfmap_trace::truth::{Effort, TruePicture};
+use serde_json::Value;
+
+use crate::Failure;
+
+/// A scene that is set up, seen by a camera.
+pub(crate) struct View<'a, S> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) set: &'a S,
+    pub(crate) camera: Camera,
+    pub(crate) size: Size,
+}
+
+/// A picture through baked maps, and what a frame like it takes.
+pub(crate) struct Drawn {
+    pub(crate) picture: Picture,
+    pub(crate) milliseconds: f64,
+}
+
+/// What renders.
+pub(crate) trait Engine {
+    /// Maps baked for it.
+    type Maps<'a>
+    where
+        Self: 'a;
+
+    /// A scene's triangles, and what else it keeps of a scene.
+    type Set;
+
+    /// What it is, as JSON: `device`, and what else there is to say.
+    fn describe(&self) -> Value;
+
+    /// Bakes a scene's maps; `progress` is told the fraction done.
+    fn bake<'a>(
+        &'a self,
+        materials: &[Material],
+        method: &'a dyn Method,
+        precision: Precision,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<Self::Maps<'a>, Failure>;
+
+    /// Sets a scene up.
+    fn set(&self, scene: &Scene) -> Result<Self::Set, Failure>;
+
+    /// Renders by brute force.
+    fn truth(
+        &self,
+        view: &View<'_, Self::Set>,
+        effort: &Effort,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<TruePicture, Failure>;
+
+    /// Renders through maps.
+    fn draw(
+        &self,
+        view: &View<'_, Self::Set>,
+        maps: &Self::Maps<'_>,
+        lookups: Lookups,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<Drawn, Failure>;
+}
