@@ -27,6 +27,11 @@ impl Device {
     /// # Errors
     /// [`GpuError::NoAdapter`] and [`GpuError::NoDevice`].
     pub fn open() -> Result<Self, GpuError> {
+        Self::open_with(WANTED)
+    }
+
+    /// The same, with those of these features that it has.
+    pub(crate) fn open_with(wanted: wgpu::Features) -> Result<Self, GpuError> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
         let options = wgpu::RequestAdapterOptions {
             power_preference: wgpu::PowerPreference::HighPerformance,
@@ -38,7 +43,7 @@ impl Device {
         let name = info.name.clone();
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("ndfmap"),
-            required_features: adapter.features() & WANTED,
+            required_features: adapter.features() & wanted,
             required_limits: adapter.limits(),
             ..wgpu::DeviceDescriptor::default()
         };
@@ -128,13 +133,8 @@ impl Device {
     /// # Errors
     /// What the driver complains about, an invalid shader included.
     pub fn compute(&self, shader: &str, input: &[u8], output: u64, count: u32) -> Result<Vec<u8>, GpuError> {
-        use wgpu::util::DeviceExt;
         self.check_bytes("the inputs", input.len() as u64)?;
-        let input = self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some("input"),
-            contents: input,
-            usage: wgpu::BufferUsages::STORAGE,
-        });
+        let input = self.upload(input, wgpu::BufferUsages::STORAGE);
         let output = self.storage("output", output)?;
         let pipeline = self.compute_pipeline(shader);
         let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -147,6 +147,18 @@ impl Device {
         });
         self.dispatch(&pipeline, &group, count);
         self.read(&output)
+    }
+
+    /// A buffer that shaders read. (Filled by the queue: filling one as it is made panics on a lost device.)
+    pub(crate) fn upload(&self, bytes: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: bytes.len() as u64,
+            usage: usage | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        self.queue.write_buffer(&buffer, 0, bytes);
+        buffer
     }
 
     /// A buffer that shaders write and we read.
@@ -220,8 +232,12 @@ impl Device {
     }
 }
 
+/// Keeps the first error; a lost device explains all others.
 fn note(first: &Mutex<Option<GpuError>>, error: GpuError) {
-    first.lock().unwrap_or_else(std::sync::PoisonError::into_inner).get_or_insert(error);
+    let mut first = first.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    if first.is_none() || matches!(error, GpuError::Lost { .. }) {
+        *first = Some(error);
+    }
 }
 
 fn error_of(adapter: &str, error: &wgpu::Error) -> GpuError {

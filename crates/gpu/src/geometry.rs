@@ -3,7 +3,6 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3, Vec4};
 use ndfmap_core::scene::{Mesh, Scene, Vertex};
-use wgpu::util::DeviceExt;
 
 use crate::{Device, GpuError};
 
@@ -67,11 +66,7 @@ impl Geometry {
         }
         let upload = |what: &'static str, bytes: &[u8]| {
             device.check_bytes(what, bytes.len() as u64)?;
-            Ok(device.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some(what),
-                contents: bytes,
-                usage: wgpu::BufferUsages::STORAGE,
-            }))
+            Ok(device.upload(bytes, wgpu::BufferUsages::STORAGE))
         };
         Ok(Self {
             vertices: upload("the vertices", bytemuck::cast_slice(&vertices))?,

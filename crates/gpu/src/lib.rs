@@ -7,6 +7,8 @@ mod canvas;
 mod device;
 mod error;
 pub mod export;
+#[cfg(test)]
+mod failures;
 mod geometry;
 pub mod link;
 mod maps;

@@ -3,7 +3,6 @@
 use glam::DVec2;
 use ndfmap_core::lookup::Filtering;
 use ndfmap_core::scene::{Camera, Material, Scene};
-use wgpu::util::DeviceExt;
 
 use crate::canvas::{Canvas, Outlines, PARTS};
 use crate::geometry::Geometry;
@@ -236,12 +235,7 @@ impl<'a> Renderer<'a> {
     }
 
     fn uniform(&self, bytes: &[u8]) -> wgpu::Buffer {
-        self.buffer(bytes, wgpu::BufferUsages::UNIFORM)
-    }
-
-    fn buffer(&self, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
-        let descriptor = wgpu::util::BufferInitDescriptor { label: None, contents, usage };
-        self.device.device.create_buffer_init(&descriptor)
+        self.device.upload(bytes, wgpu::BufferUsages::UNIFORM)
     }
 
     /// Group 0 of a pass; the mask is read only where it is not being made.
@@ -253,7 +247,7 @@ impl<'a> Renderer<'a> {
         if lights.is_empty() {
             lights.push(bytemuck::Zeroable::zeroed());
         }
-        let lights = self.buffer(bytemuck::cast_slice(&lights), wgpu::BufferUsages::STORAGE);
+        let lights = self.device.upload(bytemuck::cast_slice(&lights), wgpu::BufferUsages::STORAGE);
         self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("scene"),
             layout: &self.pipelines.scene,

@@ -1,0 +1,207 @@
+//! Frames: what each method costs on this GPU, and its error; what alignment gains; what brute force costs for the same error.
+//!
+//! Methods take turns in one run, so that ratios hold on a noisy machine; times are medians, by the device's own clock where it has
+//! one. `NDFMAP_BENCH_SIZE` sets the picture's side (default 500), `NDFMAP_BENCH_RUNS` the turns (default 15).
+
+use std::time::Instant;
+
+use ndfmap_core::grid::Size;
+use ndfmap_core::lookup::Filtering;
+use ndfmap_core::metrics::{color_error, relative_l2};
+use ndfmap_core::ndf::{self, Method};
+use ndfmap_core::pyramid::Precision;
+use ndfmap_core::scene::{self, Scene, Staging};
+use ndfmap_gpu::{
+    Canvas, Device, Effort, FinestMaps, Geometry, Lookups, Maps, Outlines, Renderer, Sampling, Shown,
+};
+
+const METHODS: &[&str] = &[
+    "toksvig",
+    "fixed",
+    "naive",
+    "ndm",
+    "ndm:plane",
+    "slopes",
+    "sh:4",
+    "sh:7",
+    "vmf:1",
+    "vmf:2",
+    "vmf:4",
+    "vmf:6",
+    "vmf:8",
+    "gmm:4",
+    "phong:4",
+    "vmf:4:unaligned",
+];
+
+type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
+
+fn setting(name: &str, default: usize) -> usize {
+    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
+}
+
+/// A scene with maps no larger than the picture needs, 512 at most.
+fn staged(name: &str, time: f64, size: Size) -> Outcome<Scene> {
+    let row = scene::find(name).ok_or("no such scene")?;
+    let side = size.width.next_power_of_two().min(512);
+    Ok((row.build)(&Staging { time, map_size: Size { width: side, height: side }, map: None }))
+}
+
+fn median(mut times: Vec<f64>) -> f64 {
+    times.sort_by(f64::total_cmp);
+    times[times.len() / 2]
+}
+
+/// How a method is drawn here: lobes that are not aligned need every texel shaded.
+fn lookups(spelling: &str, sampling: Sampling) -> Lookups {
+    let neighbours = spelling.ends_with("unaligned");
+    let sampling = if neighbours { Sampling::Taps(Filtering::TRILINEAR) } else { sampling };
+    Lookups { sampling, neighbours, at_means: false }
+}
+
+struct Bench<'a> {
+    device: &'a Device,
+    renderer: &'a Renderer<'a>,
+    runs: usize,
+}
+
+impl Bench<'_> {
+    /// Median milliseconds of each method's frame, taking turns.
+    fn times(
+        &self,
+        canvas: &Canvas<'_>,
+        shown: &Shown<'_>,
+        all: &[(&str, Maps<'_>)],
+        sampling: Sampling,
+    ) -> Outcome<Vec<f64>> {
+        let mut times = vec![Vec::new(); all.len()];
+        for turn in 0..=self.runs {
+            for (times, (name, maps)) in times.iter_mut().zip(all) {
+                let ms = self.renderer.time(canvas, shown, maps, lookups(name, sampling))?;
+                // The first turn makes pipelines and warms up.
+                if turn > 0 {
+                    times.push(ms);
+                }
+            }
+        }
+        Ok(times.into_iter().map(median).collect())
+    }
+
+    fn methods(&self, name: &str, time: f64, size: Size) -> Outcome<()> {
+        let scene = staged(name, time, size)?;
+        let geometry = Geometry::new(self.device, &scene)?;
+        let shown = Shown { scene: &scene, geometry: &geometry, camera: &scene.camera };
+        let canvas = Canvas::new(self.device, size, Outlines::Sharp)?;
+        let parts = Canvas::new(self.device, size, Outlines::Parts)?;
+        let finest = FinestMaps::new(self.device, &scene.materials)?;
+        let effort = |samples| Effort { samples, progress: &|_| () };
+        let truth = self.renderer.truth(&canvas, &shown, &finest, &effort(512))?;
+        let least = ndfmap_gpu::LEAST_SAMPLES;
+        let once = || -> Outcome<f64> {
+            let start = Instant::now();
+            self.renderer.truth(&canvas, &shown, &finest, &effort(least))?;
+            Ok(start.elapsed().as_secs_f64() * 1e3 / least as f64)
+        };
+        let sample = median((0..self.runs.min(5)).map(|_| once()).collect::<Outcome<Vec<f64>>>()?);
+        println!(
+            "\n{name} at time {time}, {} x {}; truth of {} samples, noise {:.3}, {sample:.1} ms a sample",
+            size.width, size.height, truth.samples, truth.noise
+        );
+        let parsed = METHODS.iter().map(|m| ndf::parse(m)).collect::<Result<Vec<Box<dyn Method>>, _>>()?;
+        let mut all = Vec::new();
+        for (name, method) in METHODS.iter().zip(&parsed) {
+            all.push((*name, Maps::new(self.device, &scene.materials, &**method, Precision::Half, &|_| ())?));
+        }
+        let filters = [
+            ("sampler", Sampling::Sampler(1)),
+            ("trilinear", Sampling::Taps(Filtering::TRILINEAR)),
+            ("fine:16", Sampling::Taps(Filtering::fine(16))),
+        ];
+        println!(
+            "{:16} {:>10} {:>8} {:>9} {:>12} {:>12} {:>22}",
+            "method", "filter", "ms", "/ toksvig", "color_error", "relative_l2", "truth of that error / ms"
+        );
+        for (filter, sampling) in filters {
+            let times = self.times(&canvas, &shown, &all, sampling)?;
+            for ((name, maps), ms) in all.iter().zip(&times) {
+                self.renderer.draw(&parts, &shown, maps, lookups(name, sampling))?;
+                let picture = parts.read()?;
+                let error = relative_l2(&picture, &truth.picture);
+                // Noise falls with the root of the samples: so many have as much of it as the method has error.
+                let samples = truth.samples as f64 * (truth.noise / error).powi(2);
+                println!(
+                    "{name:16} {filter:>10} {ms:>8.2} {:>9.2} {:>12.4} {error:>12.3} {:>22.1}",
+                    ms / times[0],
+                    color_error(&picture, &truth.picture, scene.exposure),
+                    samples.max(1.0) * sample / ms
+                );
+            }
+        }
+        Ok(())
+    }
+
+    fn creature(&self, size: Size) -> Outcome<()> {
+        let scene = staged("creature", 0.3, size)?;
+        let geometry = Geometry::new(self.device, &scene)?;
+        let shown = Shown { scene: &scene, geometry: &geometry, camera: &scene.camera };
+        let method = ndf::parse("vmf:6")?;
+        let all = [("vmf:6", Maps::new(self.device, &scene.materials, &*method, Precision::Half, &|_| ())?)];
+        for outlines in [Outlines::Sharp, Outlines::Multisampled] {
+            let canvas = Canvas::new(self.device, size, outlines)?;
+            let ms = self.times(&canvas, &shown, &all, Sampling::Sampler(1))?[0];
+            let Size { width, height } = size;
+            println!("creature, {width} x {height}, vmf:6, sampler, outlines {outlines:?}: {ms:.2} ms");
+        }
+        Ok(())
+    }
+}
+
+/// From nothing to the first picture, baking apart.
+fn start(spelling: &str, size: Size) -> Outcome<()> {
+    let scene = staged("disk", 0.1, size)?;
+    let method = ndf::parse(spelling)?;
+    let begin = Instant::now();
+    let device = Device::open()?;
+    let opened = begin.elapsed();
+    let renderer = Renderer::new(&device);
+    let geometry = Geometry::new(&device, &scene)?;
+    let baking = Instant::now();
+    let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ())?;
+    let baked = baking.elapsed();
+    let shown = Shown { scene: &scene, geometry: &geometry, camera: &scene.camera };
+    let canvas = Canvas::new(&device, size, Outlines::Multisampled)?;
+    renderer.draw(&canvas, &shown, &maps, Lookups::TRILINEAR)?;
+    canvas.read()?;
+    let all = begin.elapsed();
+    println!(
+        "{spelling}: first picture {:.2} s after the start: device {:.2} s, bake and upload {:.2} s",
+        all.as_secs_f64(),
+        opened.as_secs_f64(),
+        baked.as_secs_f64()
+    );
+    Ok(())
+}
+
+fn main() -> Outcome<()> {
+    let (side, runs) = (setting("NDFMAP_BENCH_SIZE", 500), setting("NDFMAP_BENCH_RUNS", 15));
+    let size = Size { width: side, height: side };
+    let device = match Device::open() {
+        Ok(device) => device,
+        Err(e) => {
+            println!("skipped: {e}");
+            return Ok(());
+        }
+    };
+    println!("{}, clock: {}", device.description(), if device.has_timestamps() { "device" } else { "wall" });
+    for spelling in ["toksvig", "vmf:4", "phong:4"] {
+        start(spelling, size)?;
+    }
+    let renderer = Renderer::new(&device);
+    let bench = Bench { device: &device, renderer: &renderer, runs };
+    // 640 x 480 for the default size, as in Han et al.
+    bench.creature(Size { width: side * 32 / 25, height: side * 24 / 25 })?;
+    for (name, time) in [("disk", 0.15), ("armour", 0.5)] {
+        bench.methods(name, time, size)?;
+    }
+    Ok(())
+}

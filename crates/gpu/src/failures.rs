@@ -1,0 +1,83 @@
+//! Tests: what goes wrong on a device comes back as an error that says what.
+
+use ndfmap_core::grid::Size;
+use ndfmap_core::ndf;
+use ndfmap_core::pyramid::Precision;
+use ndfmap_core::scene::{self, Scene, Staging};
+
+use crate::{Canvas, Device, Geometry, GpuError, Lookups, Maps, Outlines, Renderer, Shown};
+
+/// A device with only some of the features we use; `None` skips, where the tests are not told to insist.
+fn device(features: wgpu::Features) -> Option<Device> {
+    match Device::open_with(features) {
+        Err(e @ GpuError::NoAdapter) if std::env::var_os("NDFMAP_REQUIRE_GPU").is_none() => {
+            eprintln!("skipped: {e}");
+            None
+        }
+        opened => Some(opened.unwrap_or_else(|e| panic!("{e}"))),
+    }
+}
+
+fn foil(size: Size) -> Scene {
+    let row = scene::find("foil").unwrap_or_else(|| panic!("foil is a scene"));
+    (row.build)(&Staging { time: 0.0, map_size: size, map: None })
+}
+
+const SMALL: Size = Size { width: 16, height: 16 };
+
+#[test]
+fn a_map_that_is_too_large_is_named() {
+    let Some(device) = device(wgpu::Features::empty()) else { return };
+    let scene = foil(Size { width: 40_000, height: 1 });
+    let method = ndf::parse("naive").unwrap();
+    let failed = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).err().unwrap();
+    assert!(matches!(failed, GpuError::TooLarge { width: 40_000, .. }), "{failed}");
+    let said = failed.to_string();
+    assert!(said.starts_with("the map of material `foil` of 40000 × 1 in 2 layers is too large"), "{said}");
+    let huge = Size { width: 100_000, height: 2 };
+    assert!(matches!(Canvas::new(&device, huge, Outlines::Sharp), Err(GpuError::TooLarge { .. })));
+}
+
+#[test]
+fn without_filtering_of_floats_half_floats_are_asked_for() {
+    let Some(device) = device(wgpu::Features::empty()) else { return };
+    let (scene, method) = (foil(SMALL), ndf::parse("naive").unwrap());
+    let with = |precision| Maps::new(&device, &scene.materials, &*method, precision, &|_| ());
+    let failed = with(Precision::Single).err().unwrap();
+    assert!(matches!(failed, GpuError::Unsupported { .. }));
+    assert!(
+        failed.to_string().ends_with("has no filtering of 32-bit floats: bake in half floats"),
+        "{failed}"
+    );
+    assert!(with(Precision::Half).is_ok());
+}
+
+#[test]
+fn frames_are_timed_with_and_without_a_clock_on_the_device() {
+    for features in [wgpu::Features::empty(), wgpu::Features::TIMESTAMP_QUERY] {
+        let Some(device) = device(features) else { return };
+        let (scene, method) = (foil(SMALL), ndf::parse("naive").unwrap());
+        let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
+        let geometry = Geometry::new(&device, &scene).unwrap();
+        let shown = Shown { scene: &scene, geometry: &geometry, camera: &scene.camera };
+        let canvas = Canvas::new(&device, SMALL, Outlines::Sharp).unwrap();
+        let renderer = Renderer::new(&device);
+        let ms = renderer.time(&canvas, &shown, &maps, Lookups::TRILINEAR).unwrap();
+        assert!(ms > 0.0 && ms < 1e4, "{ms}");
+    }
+}
+
+#[test]
+fn a_lost_device_is_an_error() {
+    let Some(device) = device(wgpu::Features::empty()) else { return };
+    let (scene, method) = (foil(SMALL), ndf::parse("naive").unwrap());
+    let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
+    let geometry = Geometry::new(&device, &scene).unwrap();
+    let renderer = Renderer::new(&device);
+    let canvas = Canvas::new(&device, SMALL, Outlines::Sharp).unwrap();
+    device.device.destroy();
+    let shown = Shown { scene: &scene, geometry: &geometry, camera: &scene.camera };
+    let drawn = renderer.draw(&canvas, &shown, &maps, Lookups::TRILINEAR);
+    let failed = drawn.and_then(|()| canvas.read()).err().unwrap();
+    assert!(failed.to_string().contains("lost"), "{failed}");
+}
