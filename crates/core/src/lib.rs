@@ -43,4 +43,5 @@ pub mod scene;
 pub mod shader;
 pub mod sphere;
 pub mod surface;
+pub mod tone;
 pub mod units;

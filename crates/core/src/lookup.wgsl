@@ -120,20 +120,18 @@ struct Neighbour {
     weight: f32,
 }
 
-// Texel i of the eight that a trilinear filter mixes.
+// Texel i of the eight that a trilinear filter mixes. At the coarsest level the last four have no share, and are not there.
 fn neighbour(map: texture_2d_array<f32>, uv: vec2<f32>, lod: f32, repeat: vec2<bool>, i: u32) -> Neighbour {
     let coarser = i / 4u;
     let level = u32(floor(lod)) + coarser;
     let share = select(1.0 - fract(lod), fract(lod), coarser == 1u);
-    let finest = textureDimensions(map);
-    let held = min(level, level_count(finest) - 1u);
     // Asked for the size of a level that differs from pixel to pixel, lavapipe answers with another pixel's.
-    let size = max(finest >> vec2<u32>(held), vec2<u32>(1u));
+    let size = max(textureDimensions(map) >> vec2<u32>(level), vec2<u32>(1u));
     let x = pair(uv.x, size.x, repeat.x);
     let y = pair(uv.y, size.y, repeat.y);
     let right = (i & 1u) == 1u;
     let below = (i & 2u) == 2u;
     let texel = vec2<i32>(select(x.first, x.second, right), select(y.first, y.second, below));
     let weight = select(1.0 - x.share, x.share, right) * select(1.0 - y.share, y.share, below);
-    return Neighbour(texel, held, weight * share);
+    return Neighbour(texel, level, weight * share);
 }

@@ -8,6 +8,7 @@
 use glam::{Vec2, Vec3};
 
 use crate::grid::{Grid, Size};
+use crate::pyramid::Pyramid;
 
 /// What lies beyond the edge of a map, on one axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -131,6 +132,11 @@ pub trait Surface: Send + Sync {
     /// True when the heights mean something.
     fn has_height(&self) -> bool {
         false
+    }
+
+    /// The map of it that a method (by its spelling) has baked before, if it comes with one.
+    fn baked(&self, _method: &str) -> Option<&Pyramid> {
+        None
     }
 }
 

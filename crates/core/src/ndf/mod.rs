@@ -281,6 +281,9 @@ pub trait Method: Debug + Send + Sync {
     /// Decodes one texel's channels for people and scripts.
     fn describe(&self, channels: &[f32]) -> Decoded;
 
+    /// The mean normal of a texel with these channels, shorter the further its normals stray.
+    fn mean_normal(&self, channels: &[f32]) -> DVec3;
+
     /// An evaluator for one BRDF at fixed directions.
     fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a>;
 
@@ -343,6 +346,10 @@ impl<R: Representation> Method for R {
 
     fn describe(&self, channels: &[f32]) -> Decoded {
         self.decode(&self.unpack(channels)).into()
+    }
+
+    fn mean_normal(&self, channels: &[f32]) -> DVec3 {
+        self.mean(&self.decode(&self.unpack(channels)))
     }
 
     fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {

@@ -1,10 +1,13 @@
-//! A material's map, baked with one method: what renderers look up.
+//! A material's map, baked with one method: what renderers look up. And a baked map as the surface of a material.
+
+use glam::DVec3;
 
 use crate::bake::Bake;
 use crate::fit::{Four, LobeKind};
-use crate::grid::Grid;
+use crate::grid::{Grid, Size};
 use crate::ndf::Method;
 use crate::pyramid::{Precision, Pyramid};
+use crate::surface::{Surface, SurfaceRow, Wraps};
 
 use super::Material;
 
@@ -30,10 +33,44 @@ impl BakedMaterial {
     ) -> Self {
         let bake = Bake { surface: &*material.surface, method, precision, progress };
         let maps = material.finish_map.as_ref().map_or_else(Vec::new, |map| map.grids());
+        if let Some(pyramid) = material.surface.baked(&method.spelling()) {
+            return Self { pyramid: pyramid.clone(), attributes: 0, finish: maps };
+        }
         if method.fit().is_some_and(|fit| fit.kind != LobeKind::Peaks) {
             let (pyramid, _) = bake.to_pyramid_with(&maps);
             return Self { pyramid, attributes: maps.len(), finish: Vec::new() };
         }
         Self { pyramid: bake.to_pyramid().0, attributes: 0, finish: maps }
+    }
+}
+
+/// A baked map, taken for a surface: rendered as it is by the method that baked it. Its finest level, where a texel is one
+/// normal, is what the truth sees and what other methods bake.
+pub struct BakedSurface {
+    /// What it is baked with.
+    pub method: Box<dyn Method>,
+    /// The map.
+    pub pyramid: Pyramid,
+}
+
+impl Surface for BakedSurface {
+    fn size(&self) -> Size {
+        self.pyramid.sizes()[0]
+    }
+
+    fn wraps(&self) -> Wraps {
+        self.pyramid.wraps()
+    }
+
+    fn read_row(&self, y: usize, row: &mut SurfaceRow) {
+        for x in 0..self.size().width {
+            let channels = self.pyramid.texel(0, x, y);
+            let mean = self.method.mean_normal(&channels[..4 * self.method.layers()]);
+            row.set_normal(x, mean.normalize_or(DVec3::Z).as_vec3());
+        }
+    }
+
+    fn baked(&self, method: &str) -> Option<&Pyramid> {
+        (self.method.spelling() == method).then_some(&self.pyramid)
     }
 }

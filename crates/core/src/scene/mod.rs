@@ -17,7 +17,7 @@ mod plane;
 mod sphere;
 mod v_groove;
 
-pub use baked::BakedMaterial;
+pub use baked::{BakedMaterial, BakedSurface};
 pub use camera::{Camera, Rays};
 pub use material::{FinishMap, Material};
 pub use mesh::{Mesh, Vertex, area_normals};

@@ -48,7 +48,7 @@ fn shade(place: Place, channels: ptr<function, Channels>, plain: Finish) -> vec3
 
 fn taps_of(place: Place) -> Taps {
     var filtering = view.filtering;
-    filtering.levels = level_count(textureDimensions(map));
+    filtering.levels = textureNumLevels(map);
     return taps(PixelFootprint(place.uv, place.duv_dx, place.duv_dy), material.texels, filtering);
 }
 

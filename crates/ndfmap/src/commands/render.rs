@@ -1,18 +1,22 @@
 //! `ndfmap render`: pictures of a scene, through baked maps and by brute force, and how far they are apart.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use glam::DVec3;
-use ndfmap_core::grid::Size;
+use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
 use ndfmap_core::lookup::Filtering;
 use ndfmap_core::ndf::Method;
 use ndfmap_core::reflection::Model;
-use ndfmap_core::scene;
+use ndfmap_core::scene::{self, BakedSurface};
+use ndfmap_core::surface::Surface;
+use ndfmap_core::tone::Tone;
+use ndfmap_maps::formats::{read_file, read_ndf};
 use ndfmap_maps::picture::{PictureFormat, write_picture};
-use ndfmap_maps::source::read_source;
+use ndfmap_maps::source::{BUILTIN_PREFIX, read_source};
 use ndfmap_trace::filtered::Lookups;
 use ndfmap_trace::truth::Effort;
 use serde_json::json;
@@ -37,14 +41,13 @@ pub(super) struct Render {
     /// A built-in scene, or a model: .gltf, .glb, .obj or .ply
     #[arg(long, value_name = "NAME|FILE", value_parser = scene_name)]
     scene: String,
-    /// A normal or height map, or `builtin:NAME`, for the scene's first material
+    /// A normal or height map, `builtin:NAME`, or a baked map, for the scene's first material
     #[arg(long)]
     map: Option<PathBuf>,
     /// The picture to write, by the first method: .png as shown, .exr in linear light; several frames are numbered
     #[arg(short, long, value_name = "FILE", required_unless_present_any = ["compare", "truth_output", "json"])]
     output: Option<PathBuf>,
-    /// Methods, separated by commas
-    #[arg(short, long, value_delimiter = ',', default_value = "vmf:4", value_parser = method_spelling)]
+    #[arg(short, long, value_delimiter = ',', value_parser = method_spelling, help = "Methods, separated by commas [default: vmf:4, or a baked map's own]")]
     method: Vec<String>,
     /// Render the truth too, with at most this many rays a pixel, and measure against it
     #[arg(long, value_name = "RAYS", num_args = 0..=1, default_missing_value = "256",
@@ -94,6 +97,9 @@ pub(super) struct Render {
     /// Display values are sRGB of light times this
     #[arg(long, value_parser = positive)]
     exposure: Option<f64>,
+    /// How highlights are brought into a PNG's range: cut off (clip), or compressed (reinhard)
+    #[arg(long, default_value = "clip", value_parser = tone)]
+    tone: Tone,
     /// What renders
     #[arg(long, value_enum, default_value_t = Device::Auto)]
     device: Device,
@@ -175,6 +181,11 @@ fn scenes_help() -> String {
     let rows =
         scene::TABLE.iter().map(|r| format!("  {:13} {}; over time, {}", r.name, r.summary, r.animation));
     format!("Scenes:\n{}", rows.collect::<Vec<_>>().join("\n"))
+}
+
+fn tone(text: &str) -> Result<Tone, String> {
+    let names = Tone::ALL.map(Tone::name).join(", ");
+    Tone::ALL.into_iter().find(|t| t.name() == text).ok_or_else(|| format!("`{text}` is none of {names}"))
 }
 
 fn time(text: &str) -> Result<f64, String> {
@@ -287,8 +298,11 @@ impl Render {
         {
             return Err(Failure::Usage(format!("{}: contact sheets are written as .png", sheet.display())));
         }
+        let baked = self.read_baked()?;
+        let own = baked.as_ref().map_or_else(|| "vmf:4".to_owned(), |map| map.method.spelling());
+        let asked = if self.method.is_empty() { std::slice::from_ref(&own) } else { &self.method[..] };
         let mut methods: Vec<Box<dyn Method>> = Vec::new();
-        for spelling in &self.method {
+        for spelling in asked {
             let method = method(spelling)?;
             if methods.iter().all(|m| m.spelling() != method.spelling()) {
                 methods.push(method);
@@ -297,7 +311,7 @@ impl Render {
         if self.sparkle {
             check_drift(self.size)?;
         }
-        let stage = self.stage()?;
+        let stage = self.stage(baked)?;
         let times = match self.frames {
             Some(1) => vec![0.0],
             Some(frames) => (0..frames).map(|i| f64::from(i) / f64::from(frames - 1)).collect(),
@@ -366,15 +380,24 @@ impl Render {
         shoot(&Cpu, shot, each)
     }
 
-    fn stage(&self) -> Result<Stage, Failure> {
-        let map = match &self.map {
-            Some(path) => {
+    /// The map, where it is a baked one.
+    fn read_baked(&self) -> Result<Option<BakedSurface>, Failure> {
+        let file = |path: &&Path| !path.to_str().is_some_and(|p| p.starts_with(BUILTIN_PREFIX));
+        let Some(path) = self.map.as_deref().filter(file) else { return Ok(None) };
+        let Some(map) = read_ndf(path, &read_file(path)?)? else { return Ok(None) };
+        Ok(Some(BakedSurface { method: map.method(path)?, pyramid: map.pyramid }))
+    }
+
+    fn stage(&self, baked: Option<BakedSurface>) -> Result<Stage, Failure> {
+        let map = match (baked, &self.map) {
+            (Some(baked), _) => Some(Arc::new(baked) as Arc<dyn Surface>),
+            (None, Some(path)) => {
                 let size = self.map_size.unwrap_or(Size { width: 512, height: 512 });
                 let map = read_source(path, &self.source.options(size))?;
                 map.warnings.iter().for_each(|w| warn(path, w));
                 Some(map.surface)
             }
-            None => None,
+            (None, None) => None,
         };
         Ok(Stage {
             scene: self.scene.clone(),
@@ -404,7 +427,12 @@ impl Render {
             let (Some(path), Some(picture)) = (path, picture) else { continue };
             let path = if frames > 1 { numbered(path, at) } else { path.clone() };
             say_if_replaced(&path);
-            write_picture(&path, picture, frame.exposure)?;
+            if self.tone == Tone::Clip || PictureFormat::of(&path) != Some(PictureFormat::Png) {
+                write_picture(&path, picture, frame.exposure)?;
+            } else {
+                let shown = |x, y| self.tone.map(picture.row(y)[x] * frame.exposure);
+                write_picture(&path, &Grid::from_fn(picture.size(), shown), 1.0)?;
+            }
             written.push(path);
         }
         Ok(())
