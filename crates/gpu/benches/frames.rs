@@ -188,7 +188,7 @@ fn main() -> Outcome<()> {
     let device = match Device::open() {
         Ok(device) => device,
         Err(e) => {
-            println!("skipped: {e}");
+            println!("SKIPPED: {e}");
             return Ok(());
         }
     };

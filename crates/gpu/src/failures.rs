@@ -11,7 +11,7 @@ use crate::{Canvas, Device, Geometry, GpuError, Lookups, Maps, Outlines, Rendere
 fn device(features: wgpu::Features) -> Option<Device> {
     match Device::open_with(features) {
         Err(e @ GpuError::NoAdapter) if std::env::var_os("NDFMAP_REQUIRE_GPU").is_none() => {
-            eprintln!("skipped: {e}");
+            eprintln!("SKIPPED: {e}");
             None
         }
         opened => Some(opened.unwrap_or_else(|e| panic!("{e}"))),

@@ -15,7 +15,7 @@ fn has(compiler: &str) -> bool {
     let insist = std::env::var_os("NDFMAP_REQUIRE_INTEROP").is_some();
     assert!(found || !insist || compiler == "tint", "{compiler} is missing");
     if !found {
-        eprintln!("skipped: there is no {compiler}");
+        eprintln!("SKIPPED: there is no {compiler}");
     }
     found
 }

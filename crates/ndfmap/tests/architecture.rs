@@ -33,7 +33,10 @@ fn arrows_point_one_way() {
     assert_eq!(own_dependencies("ndfmap-maps"), set(&["ndfmap-core"]));
     assert_eq!(own_dependencies("ndfmap-trace"), set(&["ndfmap-core"]));
     assert_eq!(own_dependencies("ndfmap-gpu"), set(&["ndfmap-core"]));
-    assert_eq!(own_dependencies("ndfmap"), set(&["ndfmap-core", "ndfmap-maps", "ndfmap-trace"]));
+    assert_eq!(
+        own_dependencies("ndfmap"),
+        set(&["ndfmap-core", "ndfmap-gpu", "ndfmap-maps", "ndfmap-trace"])
+    );
 }
 
 #[test]
@@ -220,6 +223,11 @@ fn tables_in_the_documents_are_those_of_the_code() {
     }
     for model in ndfmap_core::reflection::Model::ALL {
         assert!(scenes.contains(&format!("`{}`", model.name())), "docs/scenes.md lacks {}", model.name());
+    }
+    #[cfg(feature = "gpu")]
+    for row in ndfmap::gpu::export::TABLE {
+        let gpu = read(Path::new("docs/gpu.md"));
+        assert!(gpu.contains(&format!("`{}`", row.name)), "docs/gpu.md lacks {}", row.name);
     }
     for row in ndfmap_maps::model::TABLE {
         assert!(formats.contains(row.name), "docs/formats.md lacks {}", row.name);

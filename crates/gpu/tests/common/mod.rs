@@ -7,7 +7,7 @@ pub(crate) fn device() -> Option<Device> {
     match Device::open() {
         Ok(device) => Some(device),
         Err(e @ GpuError::NoAdapter) if std::env::var_os("NDFMAP_REQUIRE_GPU").is_none() => {
-            eprintln!("skipped: {e}");
+            eprintln!("SKIPPED: {e}");
             None
         }
         Err(e) => panic!("{e}"),
