@@ -40,10 +40,35 @@ struct Reflection {
     model: u32,
     // 1: factors are taken at the lobes' means, as the papers print it.
     at_means: u32,
-    // The gloss that `table` is made for.
+    // The least gloss that `table` is made for, and how much more the most is.
     gloss: f32,
-    // What the method wants to know of the lobe (x) and of the diffuse one (y).
-    table: array<vec4<f32>, TABLE>,
+    span: f32,
+    // What the method wants to know of the lobe, entry by entry, three of these each: at eleven glosses, and of the diffuse lobe.
+    table: array<vec4<f32>, 3 * TABLE>,
+}
+
+// Gloss k of the table: by equal steps of its root, 0 to 10.
+fn tabulated_gloss(reflection: Reflection, k: u32) -> f32 {
+    let t = f32(k) / 10.0;
+    return reflection.gloss + reflection.span * t * t;
+}
+
+// An entry of the table at any gloss: between two that it has, each carried on as heat spreads on a sphere, at the rate `decay`.
+fn tabulated(reflection: Reflection, entry: u32, gloss: f32, decay: f32) -> f32 {
+    if reflection.span <= 0.0 {
+        return reflection.table[3u * entry].x;
+    }
+    let t = 10.0 * sqrt(clamp((gloss - reflection.gloss) / reflection.span, 0.0, 1.0));
+    let k = min(u32(t), 9u);
+    let i = k + 1u;
+    let below = reflection.table[3u * entry + k / 4u][k % 4u] * exp(decay * (tabulated_gloss(reflection, k) - gloss));
+    let above = reflection.table[3u * entry + i / 4u][i % 4u] * exp(decay * (tabulated_gloss(reflection, i) - gloss));
+    return mix(below, above, t - f32(k));
+}
+
+// An entry of the diffuse lobe's table.
+fn tabulated_diffuse(reflection: Reflection, entry: u32) -> f32 {
+    return reflection.table[3u * entry + 2u].w;
 }
 
 // The path between two unit vectors. Only where both are above the surface (z > 0) is anything reflected.

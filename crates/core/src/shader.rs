@@ -14,7 +14,7 @@ use crate::ndf::Method;
 pub struct Shader {
     /// Constants that its text refers to, as declarations.
     pub constants: String,
-    /// Entries of the table that [`crate::ndf::Prepared::table`] makes.
+    /// Entries of the table that [`Method::shader_table`] makes.
     pub table: usize,
     /// Its text.
     pub sources: &'static [&'static str],
@@ -76,9 +76,13 @@ pub const LOOKUP: &str = include_str!("lookup.wgsl");
 
 /// The text that decodes and shades texels of a method with a lobe.
 ///
-/// `attributes` (0 to 2) is how many colours each lobe carries: albedo with gloss, and specular colour. Only fitted lobes can.
+/// `attributes` (0 to 2) is how many colours each lobe carries: albedo with gloss, and specular colour.
+///
+/// # Panics
+/// When there are attributes and the method has no fitted lobes to carry them.
 #[must_use]
 pub fn link(method: &dyn Method, lobe: &dyn Brdf, attributes: usize) -> String {
+    assert!(attributes == 0 || method.fit().is_some(), "only fitted lobes carry attributes");
     let own = method.shader();
     let layers = method.layers() as u32;
     let constants = [

@@ -36,7 +36,7 @@ impl Tone {
     pub fn map(self, colour: Vec3) -> Vec3 {
         let luminance = colour.dot(LUMINANCE);
         match self {
-            Self::Reinhard if luminance > 0.0 => {
+            Self::Reinhard if luminance > 0.0 && luminance < f32::INFINITY => {
                 colour * ((1.0 + luminance / (WHITE * WHITE)) / (1.0 + luminance))
             }
             Self::Clip | Self::Reinhard => colour,
@@ -58,6 +58,7 @@ mod tests {
         assert!((Tone::Reinhard.map(dark) / dark - 1.0).abs().max_element() < 0.0018);
         assert_eq!(Tone::Reinhard.map(Vec3::ZERO), Vec3::ZERO);
         assert_eq!(Tone::Clip.map(dark), dark);
+        assert_eq!(Tone::Reinhard.map(Vec3::INFINITY), Vec3::INFINITY);
     }
 
     #[test]

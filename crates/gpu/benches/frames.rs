@@ -94,7 +94,7 @@ impl Bench<'_> {
         let canvas = Canvas::new(self.device, size, Outlines::Sharp)?;
         let parts = Canvas::new(self.device, size, Outlines::Parts)?;
         let finest = FinestMaps::new(self.device, &scene.materials)?;
-        let effort = |samples| Effort { samples, progress: &|_| () };
+        let effort = |samples| Effort { samples, noise: 0.0, progress: &|_| () };
         let truth = self.renderer.truth(&canvas, &shown, &finest, &effort(512))?;
         let least = ndfmap_gpu::LEAST_SAMPLES;
         let once = || -> Outcome<f64> {

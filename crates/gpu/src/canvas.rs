@@ -66,6 +66,9 @@ impl<'a> Canvas<'a> {
     pub fn new(device: &'a Device, size: Size, outlines: Outlines) -> Result<Self, GpuError> {
         let extent =
             wgpu::Extent3d { width: size.width as u32, height: size.height as u32, depth_or_array_layers: 1 };
+        if size.area() == 0 {
+            return Err(GpuError::Empty);
+        }
         device.check_size("a picture", extent)?;
         let sums = device.storage("a picture's pixels", 16 * size.area() as u64)?;
         let texture = |size, format, samples, usage| {

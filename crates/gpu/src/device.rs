@@ -89,13 +89,20 @@ impl Device {
     /// # Errors
     /// What the driver complained about.
     pub fn wait(&self) -> Result<(), GpuError> {
-        let waited = self.device.poll(wgpu::PollType::wait_indefinitely());
-        let noted = self.failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take();
-        match (noted, waited) {
-            (Some(failure), _) => Err(failure),
-            (None, Err(e)) => Err(GpuError::Lost { adapter: self.name(), reason: e.to_string() }),
-            (None, Ok(_)) => Ok(()),
+        // Where the driver reports a loss while it is waited for, wgpu panics.
+        let wait = || self.device.poll(wgpu::PollType::wait_indefinitely());
+        let waited = std::panic::catch_unwind(std::panic::AssertUnwindSafe(wait));
+        let lost = |reason: String| GpuError::Lost { adapter: self.name(), reason };
+        match waited {
+            Err(_) => note(&self.failure, lost("waiting for it failed".to_owned())),
+            Ok(Err(e)) => note(&self.failure, lost(e.to_string())),
+            Ok(Ok(_)) => {}
         }
+        let mut noted = self.failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        // What is lost stays lost.
+        let failure =
+            if matches!(*noted, Some(GpuError::Lost { .. })) { noted.clone() } else { noted.take() };
+        failure.map_or(Ok(()), Err)
     }
 
     /// Checks that a texture of this size can be made.
@@ -128,10 +135,11 @@ impl Device {
     }
 
     /// Runs the entry point `main` of a compute shader, of 64 invocations a group, once for each of `count`: binding 0 is read, 1 is
-    /// written.
+    /// written. The shader counts invocations by `id.x + id.y * ROW`. For tests of twins.
     ///
     /// # Errors
     /// What the driver complains about, an invalid shader included.
+    #[doc(hidden)]
     pub fn compute(&self, shader: &str, input: &[u8], output: u64, count: u32) -> Result<Vec<u8>, GpuError> {
         self.check_bytes("the inputs", input.len() as u64)?;
         let input = self.upload(input, wgpu::BufferUsages::STORAGE);
@@ -172,8 +180,9 @@ impl Device {
         }))
     }
 
-    /// The pipeline of a shader's entry point `main`.
+    /// The pipeline of a shader's entry point `main`, which may count invocations by ROW.
     pub(crate) fn compute_pipeline(&self, shader: &str) -> wgpu::ComputePipeline {
+        let shader = format!("const ROW: u32 = {}u;\n{shader}", 64 * GROUPS_IN_A_ROW);
         let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: None,
             source: wgpu::ShaderSource::Wgsl(shader.into()),
@@ -190,6 +199,9 @@ impl Device {
 
     /// Runs it once for each of `count`, in groups of 64.
     pub(crate) fn dispatch(&self, pipeline: &wgpu::ComputePipeline, group: &wgpu::BindGroup, count: u32) {
+        if count == 0 {
+            return;
+        }
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());

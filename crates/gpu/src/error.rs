@@ -36,6 +36,9 @@ pub enum GpuError {
         /// Its most layers.
         most_layers: u32,
     },
+    /// A picture without a pixel.
+    #[error("a picture must have a pixel")]
+    Empty,
     /// Something that needs a feature the adapter lacks.
     #[error("{adapter} has no {feature}: {instead}")]
     Unsupported {

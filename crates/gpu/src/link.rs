@@ -13,6 +13,9 @@ pub const DRAW: &str = include_str!("passes/draw.wgsl");
 /// What draw passes share: the camera, the lights, the triangles.
 const SCENE: &str = include_str!("passes/scene.wgsl");
 
+/// What passes that shade know of a material.
+const MATERIAL: &str = include_str!("passes/material.wgsl");
+
 /// The pass that draws the truth.
 const TRUTH: &str = include_str!("passes/truth.wgsl");
 
@@ -47,7 +50,7 @@ pub fn check(text: String) -> Result<Linked, GpuError> {
 /// # Errors
 /// [`GpuError::Shader`].
 pub fn draw(method: &dyn Method, lobe: &dyn Brdf, attributes: usize) -> Result<Linked, GpuError> {
-    check([&shader::link(method, lobe, attributes), LOOKUP, SCENE, DRAW].join("\n"))
+    check([&shader::link(method, lobe, attributes), LOOKUP, SCENE, MATERIAL, DRAW].join("\n"))
 }
 
 /// The shader that draws the truth of a lobe. It has no method in it.
@@ -55,10 +58,10 @@ pub fn draw(method: &dyn Method, lobe: &dyn Brdf, attributes: usize) -> Result<L
 /// # Errors
 /// [`GpuError::Shader`].
 pub fn truth(lobe: &dyn Brdf) -> Result<Linked, GpuError> {
-    check([&shader::link_lobe(lobe), SCENE, TRUTH].join("\n"))
+    check([&shader::link_lobe(lobe), SCENE, MATERIAL, TRUTH].join("\n"))
 }
 
 /// The shader that draws places and faces, for outlines.
 pub(crate) fn place() -> Result<Linked, GpuError> {
-    check([LOOKUP, SCENE, PLACE].join("\n"))
+    check([SCENE, PLACE].join("\n"))
 }

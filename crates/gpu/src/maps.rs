@@ -23,7 +23,8 @@ pub(crate) struct Textures {
     pub(crate) wraps: Wraps,
 }
 
-/// The maps of a scene's materials, baked with one method. Camera, lights, lobes, models and meshes may change after.
+/// The maps of a scene's materials, baked with one method. Camera, lights, lobes, models and meshes may change after, and colours and
+/// gloss but for this: a material keeps the `finish_map` that it was baked with, or has none still.
 pub struct Maps<'a> {
     pub(crate) method: &'a dyn Method,
     pub(crate) materials: Vec<Textures>,
@@ -136,23 +137,22 @@ fn create(device: &Device, what: &str, size: Size, stored: Stored) -> Result<wgp
 /// Uploads a level: its layers one after another, each rows of texels.
 fn write(device: &Device, texture: &wgpu::Texture, level: u32, size: Size, bytes: &[u8]) {
     let (width, height) = (size.width as u32, size.height as u32);
-    let texel = texture.format().block_copy_size(None).unwrap_or(8);
-    let layers = bytes.len() as u32 / (texel * width * height);
-    device.queue.write_texture(
-        wgpu::TexelCopyTextureInfo {
-            texture,
-            mip_level: level,
-            origin: wgpu::Origin3d::ZERO,
-            aspect: wgpu::TextureAspect::All,
-        },
-        bytes,
-        wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(texel * width),
-            rows_per_image: Some(height),
-        },
-        wgpu::Extent3d { width, height, depth_or_array_layers: layers },
-    );
+    let row = texture.format().block_copy_size(None).unwrap_or(8) * width;
+    for (layer, bytes) in bytes.chunks_exact(row as usize * size.height).enumerate() {
+        device.queue.write_texture(
+            wgpu::TexelCopyTextureInfo {
+                texture,
+                mip_level: level,
+                origin: wgpu::Origin3d { x: 0, y: 0, z: layer as u32 },
+                aspect: wgpu::TextureAspect::All,
+            },
+            bytes,
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: None },
+            wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        );
+        // Copies wait in memory until something is submitted.
+        device.queue.submit([]);
+    }
 }
 
 fn array_view(texture: &wgpu::Texture) -> wgpu::TextureView {

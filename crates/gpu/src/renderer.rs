@@ -60,7 +60,7 @@ pub struct Renderer<'a> {
 /// What a pass draws with: for each material its pipeline and its group.
 pub(crate) struct Dressed {
     pipeline: std::sync::Arc<wgpu::RenderPipeline>,
-    group: Option<wgpu::BindGroup>,
+    group: wgpu::BindGroup,
 }
 
 /// One pass over all triangles.
@@ -95,7 +95,7 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    /// Draws a picture; [`Canvas::read`] has it.
+    /// Draws a picture; [`Canvas::read`] has it. Waits for the picture before, so that no queue grows without end.
     ///
     /// # Errors
     /// [`GpuError`].
@@ -106,10 +106,9 @@ impl<'a> Renderer<'a> {
         maps: &Maps<'_>,
         lookups: Lookups,
     ) -> Result<(), GpuError> {
+        self.device.wait()?;
         let dressed = self.dress(shown.scene, maps, lookups, canvas.outlines)?;
-        let view = View::new(shown.camera, canvas.size, shown.geometry);
-        let view =
-            if let Sampling::Taps(filtering) = lookups.sampling { view.with_filter(filtering) } else { view };
+        let view = View::new(shown.camera, canvas.size, shown.geometry).on(canvas, lookups.sampling);
         self.pass(canvas, shown, &Pass { view, dressed: &dressed, clock: None });
         self.add(canvas, (0.0, 1.0), false);
         if canvas.outlines != Outlines::Parts {
@@ -122,7 +121,7 @@ impl<'a> Renderer<'a> {
             let offset = (part + 0.5) / PARTS as f64 - 0.5;
             let camera = Camera { shift: shown.camera.shift - offset, ..*shown.camera };
             let moved = View::new(&camera, canvas.size, shown.geometry);
-            let view = View { width: 1.0 / PARTS as f32, masked: 1, ..moved.filtered_as(&view) };
+            let view = View { width: 1.0 / PARTS as f32, masked: 1, ..moved.on(canvas, lookups.sampling) };
             self.pass(canvas, shown, &Pass { view, dressed: &dressed, clock: None });
             self.add(canvas, (if i == 0 { 0.0 } else { 1.0 }, share), true);
         }
@@ -142,9 +141,7 @@ impl<'a> Renderer<'a> {
         lookups: Lookups,
     ) -> Result<f64, GpuError> {
         let dressed = self.dress(shown.scene, maps, lookups, canvas.outlines)?;
-        let view = View::new(shown.camera, canvas.size, shown.geometry);
-        let view =
-            if let Sampling::Taps(filtering) = lookups.sampling { view.with_filter(filtering) } else { view };
+        let view = View::new(shown.camera, canvas.size, shown.geometry).on(canvas, lookups.sampling);
         self.clocked(|clock| self.pass(canvas, shown, &Pass { view, dressed: &dressed, clock }))
     }
 
@@ -194,10 +191,9 @@ impl<'a> Renderer<'a> {
         let one = |(material, textures): (&Material, &Textures)| {
             let lobe = &*material.reflection.lobe;
             let pipeline = self.pipelines.draw((maps.method, lobe), textures.attributes, entry, outlines)?;
-            let prepared = maps.method.prepare(&material.reflection, material.finish.gloss);
             let place = (textures.size, textures.wraps);
             let bytes =
-                uniforms::material(material, place, textures.mapped, Some(&prepared), lookups.at_means);
+                uniforms::material(material, place, textures.mapped, Some(maps.method), lookups.at_means);
             let sampler = sampler(self.device, textures.wraps, anisotropy);
             let group = self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("material"),
@@ -209,7 +205,7 @@ impl<'a> Renderer<'a> {
                     bind(3, wgpu::BindingResource::Sampler(&sampler)),
                 ],
             });
-            Ok(Dressed { pipeline, group: Some(group) })
+            Ok(Dressed { pipeline, group })
         };
         scene.materials.iter().zip(&maps.materials).map(one).collect()
     }
@@ -229,7 +225,7 @@ impl<'a> Renderer<'a> {
                     bind(2, wgpu::BindingResource::TextureView(&textures.finish)),
                 ],
             });
-            Ok(Dressed { pipeline, group: Some(group) })
+            Ok(Dressed { pipeline, group })
         };
         scene.materials.iter().zip(finest).map(one).collect()
     }
@@ -280,9 +276,7 @@ impl<'a> Renderer<'a> {
             for part in &shown.geometry.parts {
                 let Some(Dressed { pipeline, group }) = dressed.get(part.material) else { continue };
                 pass.set_pipeline(pipeline);
-                if let Some(group) = group {
-                    pass.set_bind_group(1, group, &[]);
-                }
+                pass.set_bind_group(1, group, &[]);
                 pass.draw(part.corners.clone(), 0..1);
             }
         });

@@ -3,7 +3,7 @@
 //! It tends to what the CPU renderer's truth tends to. Where a sample falls in a pixel is the same for all pixels of a picture, stratified over
 //! 4 × 4 squares; which of the nearest texels it shades is each pixel's own chance.
 
-use glam::{DVec2, Vec3};
+use glam::{DVec2, DVec3};
 use ndfmap_core::grid::Grid;
 use ndfmap_core::metrics::{Picture, relative_l2};
 use ndfmap_core::scene::{Camera, Material};
@@ -40,6 +40,8 @@ impl FinestMaps {
 pub struct Effort<'a> {
     /// Samples a pixel, rounded up to a multiple of [`LEAST_SAMPLES`].
     pub samples: usize,
+    /// Stop once the noise is below this, too; 0 never does.
+    pub noise: f64,
     /// Told the fraction done.
     pub progress: &'a (dyn Fn(f64) + Sync),
 }
@@ -71,33 +73,58 @@ impl Renderer<'_> {
     ) -> Result<TruePicture, GpuError> {
         assert_eq!(canvas.outlines, Outlines::Sharp, "the truth smooths outlines by itself");
         let dressed = self.dress_finest(shown.scene, &finest.materials)?;
-        let passes = effort.samples.div_ceil(LEAST_SAMPLES).max(1);
-        let each = passes * STRATA * STRATA;
-        let half = |half: usize| -> Result<Picture, GpuError> {
-            for i in 0..each {
-                let number = (half * each + i) as u32;
-                let [u, v] = [0, 1].map(|axis| f64::from(scramble(2 * number + axis)) / f64::from(u32::MAX));
-                let stratum = DVec2::new((i % STRATA) as f64, (i / STRATA % STRATA) as f64);
-                let offset = (stratum + DVec2::new(u, v)) / STRATA as f64 - 0.5;
-                let camera = Camera { shift: shown.camera.shift - offset, ..*shown.camera };
-                let view = View::new(&camera, canvas.size, shown.geometry);
-                let view = View { seed: scramble(number), ..view };
-                self.pass(canvas, shown, &Pass { view, dressed: &dressed, clock: None });
-                self.add(canvas, (if i == 0 { 0.0 } else { 1.0 }, 1.0 / each as f32), false);
-                // A queue without end would be memory without end.
-                if i % (STRATA * STRATA) == 0 {
+        let rounds = effort.samples.div_ceil(LEAST_SAMPLES).max(1);
+        let mut halves = [vec![DVec3::ZERO; canvas.size.area()], vec![DVec3::ZERO; canvas.size.area()]];
+        let mut done = 0;
+        loop {
+            // Doubling where a noise is asked for, so that looking at it costs little; and never so much at once that single floats
+            // lose what is added.
+            let wanted = if effort.noise > 0.0 { done.max(1) } else { rounds };
+            let more = wanted.min(rounds - done).min(MOST_ROUNDS);
+            for (half, sums) in halves.iter_mut().enumerate() {
+                for round in done..done + more {
+                    for stratum in 0..STRATA * STRATA {
+                        let number = (2 * round + half) * STRATA * STRATA + stratum;
+                        let view = jittered(shown, canvas, stratum, number as u32);
+                        self.pass(canvas, shown, &Pass { view, dressed: &dressed, clock: None });
+                        let first = round == done && stratum == 0;
+                        self.add(canvas, (if first { 0.0 } else { 1.0 }, 1.0), false);
+                    }
+                    // A queue without end would be memory without end.
                     canvas.device.wait()?;
-                    (effort.progress)(f64::from(number) / (2 * each) as f64);
+                    let part = (half * more + round + 1 - done) as f64 / 2.0;
+                    (effort.progress)((done as f64 + part) / rounds as f64);
+                }
+                for (sum, colour) in sums.iter_mut().zip(canvas.read()?.texels()) {
+                    *sum += colour.as_dvec3();
                 }
             }
-            canvas.read()
-        };
-        let (a, b) = (half(0)?, half(1)?);
-        (effort.progress)(1.0);
-        let mean = |a: Vec3, b: Vec3| 0.5 * (a + b);
-        let picture = Grid::from_fn(canvas.size, |x, y| mean(a.row(y)[x], b.row(y)[x]));
-        Ok(TruePicture { picture, samples: passes * LEAST_SAMPLES, noise: relative_l2(&a, &b) / 2.0 })
+            done += more;
+            let share = 1.0 / (done * STRATA * STRATA) as f64;
+            let [a, b] = halves.each_ref().map(|sums| {
+                let colours = sums.iter().map(|sum| (*sum * share).as_vec3()).collect();
+                Grid::from_vec(canvas.size, colours).unwrap_or_else(|| unreachable!("one colour a pixel"))
+            });
+            let noise = relative_l2(&a, &b) / 2.0;
+            if done == rounds || noise <= effort.noise {
+                (effort.progress)(1.0);
+                let picture = Grid::from_fn(canvas.size, |x, y| 0.5 * (a.row(y)[x] + b.row(y)[x]));
+                return Ok(TruePicture { picture, samples: done * LEAST_SAMPLES, noise });
+            }
+        }
     }
+}
+
+/// Rounds of strata that are added up in single floats.
+const MOST_ROUNDS: usize = 64;
+
+/// What is seen through a stratum of every pixel, somewhere in it.
+fn jittered(shown: &Shown<'_>, canvas: &Canvas<'_>, stratum: usize, number: u32) -> View {
+    let [u, v] = [0, 1].map(|axis| f64::from(scramble(number.wrapping_mul(2) + axis)) / f64::from(u32::MAX));
+    let corner = DVec2::new((stratum % STRATA) as f64, (stratum / STRATA) as f64);
+    let offset = (corner + DVec2::new(u, v)) / STRATA as f64 - 0.5;
+    let camera = Camera { shift: shown.camera.shift - offset, ..*shown.camera };
+    View { seed: scramble(number), ..View::new(&camera, canvas.size, shown.geometry) }
 }
 
 /// A number that is as good as random (the finaliser of MurmurHash3, Appleby 2011, of a counter).

@@ -5,11 +5,13 @@ use glam::{DVec3, Mat4, Vec3, Vec4};
 use ndfmap_core::grid::Size;
 use ndfmap_core::light::Light;
 use ndfmap_core::lookup::Filtering;
-use ndfmap_core::ndf::Prepared;
+use ndfmap_core::ndf::Method;
 use ndfmap_core::scene::{Camera, Material};
 use ndfmap_core::surface::{Wrap, Wraps};
 
+use crate::canvas::Canvas;
 use crate::geometry::Geometry;
+use crate::renderer::Sampling;
 
 /// `View` in `scene.wgsl`.
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -27,7 +29,7 @@ pub(crate) struct View {
     pub(crate) max_taps: u32,
     pub(crate) parts: u32,
     pub(crate) lod_bias: f32,
-    pub(crate) levels: u32,
+    pub(crate) brightest: f32,
 }
 
 impl View {
@@ -42,8 +44,8 @@ impl View {
             step * (2.0 / (pixels as f64 * square)) + forward * (2.0 * middle / pixels as f64 - 1.0)
         };
         let (x, y) = (axis(rays.right, size.width), -axis(rays.down, size.height));
-        // Nothing is nearer than this; beyond it depths go on for ever.
-        let near = 1e-5 * (geometry.radius + geometry.middle.distance(rays.eye));
+        // Nothing is nearer than this; beyond it depths go on for ever. Floats have the same digits for it as for any other.
+        let near = 1e-9 * (geometry.radius + geometry.middle.distance(rays.eye));
         let column = |k: usize| Vec4::new(x[k] as f32, y[k] as f32, 0.0, forward[k] as f32);
         Self {
             clip: Mat4::from_cols(column(0), column(1), column(2), Vec4::new(0.0, 0.0, near as f32, 0.0)),
@@ -58,24 +60,18 @@ impl View {
             max_taps: 1,
             parts: 1,
             lod_bias: 0.0,
-            levels: 1,
+            brightest: f32::MAX,
         }
     }
 
-    /// The same with the filter of another.
-    pub(crate) fn filtered_as(self, other: &Self) -> Self {
-        let Self { max_taps, parts, lod_bias, .. } = *other;
-        Self { max_taps, parts, lod_bias, ..self }
-    }
-
-    /// The same with a filter.
-    pub(crate) fn with_filter(self, filtering: Filtering) -> Self {
-        Self {
-            max_taps: filtering.max_taps as u32,
-            parts: filtering.parts as u32,
-            lod_bias: filtering.lod_bias as f32,
-            ..self
-        }
+    /// The same on a canvas, with a filter.
+    pub(crate) fn on(self, canvas: &Canvas<'_>, sampling: Sampling) -> Self {
+        let half = canvas.outlines.format() == wgpu::TextureFormat::Rgba16Float;
+        let brightest = if half { half::f16::MAX.to_f32() } else { f32::MAX };
+        let view = Self { brightest, ..self };
+        let Sampling::Taps(Filtering { max_taps, parts, lod_bias }) = sampling else { return view };
+        let (max_taps, parts, lod_bias) = (max_taps as u32, parts as u32, lod_bias as f32);
+        Self { max_taps, parts, lod_bias, ..view }
     }
 }
 
@@ -106,7 +102,7 @@ pub(crate) fn material(
     material: &Material,
     (size, wraps): (Size, Wraps),
     mapped: u32,
-    prepared: Option<&Prepared>,
+    method: Option<&dyn Method>,
     at_means: bool,
 ) -> Vec<u8> {
     let finish = material.finish;
@@ -122,8 +118,10 @@ pub(crate) fn material(
     four([f(size.width as f64), f(size.height as f64), mapped.to_le_bytes(), repeat.to_le_bytes()]);
     let reflection = &material.reflection;
     let model = reflection.model.index().to_le_bytes();
-    four([f(reflection.lobe.base()), model, u32::from(at_means).to_le_bytes(), gloss.to_le_bytes()]);
-    let table = prepared.map_or_else(|| vec![[0.0; 4]], Prepared::table);
-    table.iter().for_each(|entry| four(entry.map(f32::to_le_bytes)));
+    let (least, most) = material.gloss_range();
+    four([f(reflection.lobe.base()), model, u32::from(at_means).to_le_bytes(), f(least.get())]);
+    four([f(most.get() - least.get()), [0; 4], [0; 4], [0; 4]]);
+    let table = method.map_or_else(|| vec![[0.0; 12]], |method| method.shader_table(reflection, least, most));
+    table.as_flattened().as_chunks::<4>().0.iter().for_each(|entry| four(entry.map(f32::to_le_bytes)));
     bytes
 }

@@ -99,7 +99,7 @@ struct Question<'a> {
 impl Question<'_> {
     /// The inputs as the shader takes them; the second result says which may be moved, and by how much.
     fn pack(&self, probe: &Probe, out: &mut Vec<f32>) {
-        let prepared = self.method.prepare(self.reflection, probe.finish.gloss);
+        let table = self.method.shader_table(self.reflection, probe.finish.gloss, probe.finish.gloss);
         let Finish { diffuse, specular, gloss } = probe.finish;
         let gloss = gloss.get() as f32;
         let base = self.reflection.lobe.base() as f32;
@@ -109,7 +109,7 @@ impl Question<'_> {
         out.extend(probe.wi.extend(0.0).to_array());
         out.extend(probe.wo.extend(0.0).to_array());
         out.extend(probe.normal.extend(0.0).to_array());
-        out.extend(prepared.table().as_flattened());
+        out.extend(table.as_flattened());
         out.extend(&probe.channels);
     }
 

@@ -1,14 +1,14 @@
 // Evaluates the twins at given inputs: `reflect_texel` as a whole, and the functions of a lobe one by one.
 
 const HEAD: u32 = 6u;
-const STRIDE: u32 = HEAD + TABLE + ALL_LAYERS;
+const STRIDE: u32 = HEAD + 3u * TABLE + ALL_LAYERS;
 
 @group(0) @binding(0) var<storage, read> input: array<vec4<f32>>;
 @group(0) @binding(1) var<storage, read_write> output: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let i = id.x + id.y * 65536u;
+    let i = id.x + id.y * ROW;
     if i * STRIDE >= arrayLength(&input) {
         return;
     }
@@ -16,13 +16,13 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let a = input[first];
     let b = input[first + 1u];
     let c = input[first + 2u];
-    var reflection = Reflection(a.x, u32(a.y), u32(a.z), a.w, array<vec4<f32>, TABLE>());
-    for (var k = 0u; k < TABLE; k++) {
+    var reflection = Reflection(a.x, u32(a.y), u32(a.z), a.w, c.w, array<vec4<f32>, 3 * TABLE>());
+    for (var k = 0u; k < 3u * TABLE; k++) {
         reflection.table[k] = input[first + HEAD + k];
     }
     var channels: Channels;
     for (var k = 0u; k < ALL_LAYERS; k++) {
-        channels[k] = input[first + HEAD + TABLE + k];
+        channels[k] = input[first + HEAD + 3u * TABLE + k];
     }
     let way = way_between(input[first + 3u].xyz, input[first + 4u].xyz);
     let plain = Finish(b.xyz, b.w, c.xyz);

@@ -293,6 +293,15 @@ pub trait Method: Debug + Send + Sync {
     /// The light that a texel with these filtered channels sends to the eye; see [`FilteredTexel`].
     fn reflect(&self, texel: &FilteredTexel<'_>, reflection: &Reflection, lights: &[Lit]) -> DVec3;
 
+    /// What shading wants to know of a material whose gloss goes from `least` to `most`, as shaders take it: entry by entry, at the eleven
+    /// glosses `least + (k/10)² (most - least)`, and then of the diffuse lobe.
+    fn shader_table(
+        &self,
+        reflection: &Reflection,
+        least: SlopeVariance,
+        most: SlopeVariance,
+    ) -> Vec<[f32; 12]>;
+
     /// The twin of decoding and shading, in WGSL; see `crates/core/src/shader.rs` for how it is linked.
     fn shader(&self) -> Shader;
 
@@ -364,6 +373,29 @@ impl<R: Representation> Method for R {
 
     fn reflect(&self, texel: &FilteredTexel<'_>, reflection: &Reflection, lights: &[Lit]) -> DVec3 {
         reflect::reflect(self, texel, reflection, lights)
+    }
+
+    fn shader_table(
+        &self,
+        reflection: &Reflection,
+        least: SlopeVariance,
+        most: SlopeVariance,
+    ) -> Vec<[f32; 12]> {
+        let mut entries = vec![[0.0; 12]; Representation::shader(self).table];
+        let mut set = |k: usize, table: Vec<f64>| {
+            entries.iter_mut().zip(table).for_each(|(entry, value)| entry[k] = value as f32);
+        };
+        let span = most.get() - least.get();
+        for k in 0..11 {
+            // All alike where there is but one gloss.
+            if k > 0 && span <= 0.0 {
+                break;
+            }
+            let t = k as f64 / 10.0;
+            set(k, self.table(&*reflection.lobe.widen(least.widen(SlopeVariance::clamped(span * t * t)))));
+        }
+        set(11, self.table(&Lambert::SHARP));
+        entries
     }
 
     fn shader(&self) -> Shader {

@@ -153,10 +153,11 @@ fn on_plane(g: ptr<function, Decoded>, base: f32, energy: f32, w: vec3<f32>) -> 
 
 fn effective(g: ptr<function, Decoded>, reflection: Reflection, gloss: f32, w: vec3<f32>) -> f32 {
     let base = brdf_widen(reflection.base, gloss);
+    let energy = tabulated(reflection, 0u, gloss, 0.0);
     if NORMALISATION == PLANE {
-        return on_plane(g, base, reflection.table[0].x, w);
+        return on_plane(g, base, energy, w);
     }
-    return on_sphere(g, base, reflection.table[0].x, w);
+    return on_sphere(g, base, energy, w);
 }
 
 fn effective_diffuse(g: ptr<function, Decoded>, reflection: Reflection, w: vec3<f32>) -> f32 {

@@ -32,16 +32,6 @@ pub struct Prepared {
     pub(super) tables: [Vec<f64>; 2],
 }
 
-impl Prepared {
-    /// The tables as the twins in WGSL take them: entry by entry, that for the lobe, that for the diffuse one, 0, 0.
-    #[must_use]
-    pub fn table(&self) -> Vec<[f32; 4]> {
-        let of = |table: &[f64], i: usize| table.get(i).map_or(0.0, |v| *v as f32);
-        let [lobe, diffuse] = &self.tables;
-        (0..lobe.len().max(1)).map(|i| [of(lobe, i), of(diffuse, i), 0.0, 0.0]).collect()
-    }
-}
-
 /// A filtered texel.
 #[derive(Clone, Copy)]
 pub struct FilteredTexel<'a> {

@@ -15,8 +15,8 @@ fn mean_normal(gamma: ptr<function, Decoded>) -> vec3<f32> {
     return vec3<f32>(y.w, y.y, y.z) * sqrt(4.0 * PI / 3.0);
 }
 
-// The series, for the zonal coefficients in one place of the table, widened by a variance.
-fn series(gamma: ptr<function, Decoded>, reflection: Reflection, place: u32, by: f32, w: vec3<f32>) -> f32 {
+// The series, for the zonal coefficients of a lobe.
+fn series(gamma: ptr<function, Decoded>, rho: ptr<function, array<f32, TABLE>>, w: vec3<f32>) -> f32 {
     var sum = 0.0;
     // (cos m phi, sin m phi) sin^m theta = Re, Im of (x + iy)^m.
     var power = vec2<f32>(1.0, 0.0);
@@ -32,12 +32,11 @@ fn series(gamma: ptr<function, Decoded>, reflection: Reflection, place: u32, by:
         for (var l = m; l <= ORDER; l++) {
             let i = l * l + l;
             let lf = f32(l);
-            let rho = reflection.table[l][place] * exp(-0.5 * by * lf * (lf + 1.0));
             var g = coefficient(gamma, i + m) * power.x;
             if m > 0u {
                 g += coefficient(gamma, i - m) * power.y;
             }
-            sum += rho * now * g;
+            sum += (*rho)[l] * now * g;
             let next = sh_ratio(lf + 1.0, mf);
             let after = next * w.z * now - select(0.0, next / ratio, l > m) * before;
             before = now;
@@ -50,11 +49,18 @@ fn series(gamma: ptr<function, Decoded>, reflection: Reflection, place: u32, by:
     return max(sum, 0.0);
 }
 
-// A gloss other than the table's widens it as heat spreads on a sphere.
 fn effective(gamma: ptr<function, Decoded>, reflection: Reflection, gloss: f32, w: vec3<f32>) -> f32 {
-    return series(gamma, reflection, 0u, gloss - reflection.gloss, w);
+    var rho: array<f32, TABLE>;
+    for (var l = 0u; l <= ORDER; l++) {
+        rho[l] = tabulated(reflection, l, gloss, 0.5 * f32(l * (l + 1u)));
+    }
+    return series(gamma, &rho, w);
 }
 
 fn effective_diffuse(gamma: ptr<function, Decoded>, reflection: Reflection, w: vec3<f32>) -> f32 {
-    return series(gamma, reflection, 1u, 0.0, w);
+    var rho: array<f32, TABLE>;
+    for (var l = 0u; l <= ORDER; l++) {
+        rho[l] = tabulated_diffuse(reflection, l);
+    }
+    return series(gamma, &rho, w);
 }

@@ -63,6 +63,7 @@ impl Surface for BakedSurface {
     }
 
     fn read_row(&self, y: usize, row: &mut SurfaceRow) {
+        row.height.fill(0.0);
         for x in 0..self.size().width {
             let channels = self.pyramid.texel(0, x, y);
             let mean = self.method.mean_normal(&channels[..4 * self.method.layers()]);

@@ -55,6 +55,17 @@ impl FinishMap {
     }
 }
 
+impl Material {
+    /// The least and the most gloss of any texel.
+    #[must_use]
+    pub fn gloss_range(&self) -> (SlopeVariance, SlopeVariance) {
+        let Some(map) = &self.finish_map else { return (self.finish.gloss, self.finish.gloss) };
+        let all = || map.diffuse_gloss.texels().iter().map(|texel| texel[3].max(0.0));
+        let (least, most) = (all().fold(f32::INFINITY, f32::min), all().fold(0.0, f32::max));
+        (SlopeVariance::clamped(least.into()), SlopeVariance::clamped(most.into()))
+    }
+}
+
 /// What an object is made of.
 pub struct Material {
     /// What it is called.

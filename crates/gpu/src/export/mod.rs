@@ -22,38 +22,49 @@ pub struct Language {
     pub name: &'static str,
     /// One line for help and docs.
     pub summary: &'static str,
-    /// What a line of comment begins with; `None` for what is no text.
-    comment: Option<&'static str>,
+    /// How the library is called; `None` for what is no text, and no library.
+    call: Option<&'static str>,
     /// Writes a linked library.
     write: fn(&Linked) -> Result<Vec<u8>, String>,
 }
+
+/// A texture and its sampler apart.
+const WITH_SAMPLER: &str = "ndf_shade(map, map_sampler, uv, place)";
+
+/// A sampler is both.
+const COMBINED: &str = "ndf_shade(map, uv, place)";
 
 /// Every language there is.
 pub static TABLE: &[Language] = &[
     Language {
         name: "wgsl",
         summary: "WebGPU Shading Language: our own text, with its comments",
-        comment: Some("//"),
+        call: Some(WITH_SAMPLER),
         write: |linked| Ok(linked.text.clone().into_bytes()),
     },
     Language {
         name: "glsl",
         summary: "GLSL 4.50, to be included after `#version`",
-        comment: Some("//"),
+        call: Some(COMBINED),
         write: |linked| glsl(linked, back::glsl::Version::Desktop(450), ""),
     },
     Language {
         name: "glsl-es",
         summary: "GLSL ES 3.00 (WebGL 2), to be included after `#version`",
-        comment: Some("//"),
+        call: Some(COMBINED),
         write: |linked| glsl(linked, back::glsl::Version::new_gles(300), ES_PRECISION),
     },
-    Language { name: "hlsl", summary: "HLSL, shader model 5.1 and up", comment: Some("//"), write: hlsl },
-    Language { name: "msl", summary: "Metal Shading Language 2.4", comment: Some("//"), write: msl },
+    Language {
+        name: "hlsl",
+        summary: "HLSL, shader model 5.1 and up",
+        call: Some(WITH_SAMPLER),
+        write: hlsl,
+    },
+    Language { name: "msl", summary: "Metal Shading Language 2.4", call: Some(WITH_SAMPLER), write: msl },
     Language {
         name: "spirv",
         summary: "SPIR-V 1.3: a fragment shader `main`, map and sampler at set 0, bindings 0 and 1",
-        comment: None,
+        call: None,
         write: spirv,
     },
 ];
@@ -78,10 +89,10 @@ impl Export<'_> {
         let linked = if language.name == "wgsl" { check(library)? } else { check(library + "\n" + entry)? };
         let body = (language.write)(&linked)
             .map_err(|e| GpuError::Shader(format!("{} cannot say it: {e}", language.name)))?;
-        let Some(comment) = language.comment else { return Ok(body) };
-        let head: String = self.head().lines().fold(String::new(), |mut head, line| {
+        let Some(call) = language.call else { return Ok(body) };
+        let head: String = self.head(call).lines().fold(String::new(), |mut head, line| {
             // Writing to a string cannot fail.
-            let _ = writeln!(head, "{comment} {line}");
+            let _ = writeln!(head, "{}", format!("// {line}").trim_end());
             head
         });
         Ok([head.into_bytes(), body].concat())
@@ -90,9 +101,13 @@ impl Export<'_> {
     /// The linked text of the library, without an entry point.
     fn library(&self) -> String {
         let lobe = &*self.reflection.lobe;
-        let table = self.method.prepare(self.reflection, SlopeVariance::ZERO).table();
-        let entry = |(i, [lobe, diffuse, ..]): (usize, &[f32; 4])| {
-            format!("    reflection.table[{i}] = vec4<f32>({lobe:?}, {diffuse:?}, 0.0, 0.0);\n")
+        let (least, most) = (SlopeVariance::ZERO, SlopeVariance::ZERO);
+        let table = self.method.shader_table(self.reflection, least, most);
+        let entry = |(i, entry): (usize, &[f32; 12])| {
+            let (first, last, lobe, diffuse) = (3 * i, 3 * i + 2, entry[0], entry[11]);
+            format!(
+                "    reflection.table[{first}].x = {lobe:?};\n    reflection.table[{last}].w = {diffuse:?};\n"
+            )
         };
         let reflection = format!(
             "// The lobe {}, in the model `{}`.\nfn ndf_reflection() -> Reflection {{\n    var reflection: Reflection;\n    \
@@ -115,15 +130,20 @@ impl Export<'_> {
     }
 
     /// What the file begins with.
-    fn head(&self) -> String {
+    fn head(&self, call: &str) -> String {
+        let sampler = if self.method.filterable() {
+            "a sampler that filters linearly on all three axes"
+        } else {
+            "any sampler: this method reads texels one by one, of a map that repeats"
+        };
         let (layers, method) = (self.method.layers(), self.method.spelling());
         let (lobe, model) = (self.reflection.lobe.spelling(), self.reflection.model.name());
         format!(
             "Normal distribution map, method {method}, lobe {lobe}, model {model}. Made by ndfmap {}.\n\
              \n\
              Bind the map that `ndfmap bake --method {method}` made as a 2-D array texture of {layers} layers, half floats, with all\n\
-             its levels and no sRGB decoding, and a sampler that filters linearly on all three axes. Then call\n\
-             \n    ndf_shade(map, sampler, uv, place)\n\n\
+             its levels and no sRGB decoding, and {sampler}. Then call\n\
+             \n    {call}\n\n\
              with uv from 0 to 1 over the map, v down its rows, and a place in the tangent frame (x along u, y against v, z out):\n\
              unit vectors to light and eye, albedo, reflectance at normal incidence. It returns the radiance to the eye, for each\n\
              unit of the light's irradiance on a plane that faces it. Call it once a light, and add.",

@@ -16,7 +16,7 @@ struct Weights {
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let size = textureDimensions(picture);
-    let i = id.x + id.y * 65536u;
+    let i = id.x + id.y * ROW;
     if i >= size.x * size.y {
         return;
     }

@@ -1,16 +1,5 @@
 // Draws a scene through a baked map: look up, decode, shade. One entry point for each way to look up.
 
-struct Material {
-    plain: Finish,
-    // Texels of the finest level.
-    texels: vec2<f32>,
-    // Colours in `finish`: 0 none, 1 albedo and gloss, 2 specular colour as well.
-    mapped: u32,
-    // Which axes repeat: 1 the first, 2 the second.
-    repeat: u32,
-    reflection: Reflection,
-}
-
 @group(1) @binding(0) var<uniform> material: Material;
 @group(1) @binding(1) var map: texture_2d_array<f32>;
 @group(1) @binding(2) var finish_map: texture_2d_array<f32>;
@@ -47,8 +36,7 @@ fn shade(place: Place, channels: ptr<function, Channels>, plain: Finish) -> vec3
 }
 
 fn taps_of(place: Place) -> Taps {
-    var filtering = view.filtering;
-    filtering.levels = textureNumLevels(map);
+    let filtering = Filtering(view.max_taps, view.parts, view.lod_bias, textureNumLevels(map));
     return taps(PixelFootprint(place.uv, place.duv_dx, place.duv_dy), material.texels, filtering);
 }
 
@@ -62,6 +50,11 @@ fn filtered_finish(around: Taps) -> Finish {
         }
     }
     return plain_finish(colours[0], colours[1]);
+}
+
+// A colour that the target can hold: half floats would make infinity of what a sharp lobe reflects.
+fn held(colour: vec3<f32>) -> vec4<f32> {
+    return vec4<f32>(min(colour, vec3<f32>(view.brightest)), 1.0);
 }
 
 // Our own taps: the same on every device.
@@ -83,7 +76,7 @@ fn filtered(in: Varying) -> @location(0) vec4<f32> {
     for (var layer = 0u; layer < ALL_LAYERS; layer++) {
         channels[layer] /= f32(count);
     }
-    return vec4<f32>(shade(place, &channels, filtered_finish(around)), 1.0);
+    return held(shade(place, &channels, filtered_finish(around)));
 }
 
 // The sampler's own choice of levels and taps.
@@ -101,7 +94,7 @@ fn sampled(in: Varying) -> @location(0) vec4<f32> {
     for (var k = 0u; k < min(material.mapped, 2u); k++) {
         colours[k] = textureSampleGrad(finish_map, linear, place.uv, k, place.duv_dx, place.duv_dy);
     }
-    return vec4<f32>(shade(place, &channels, plain_finish(colours[0], colours[1])), 1.0);
+    return held(shade(place, &channels, plain_finish(colours[0], colours[1])));
 }
 
 // Every texel that the filter reads is shaded by itself: for what must not be mixed, or is not aligned.
@@ -129,5 +122,5 @@ fn neighbours(in: Varying) -> @location(0) vec4<f32> {
             }
         }
     }
-    return vec4<f32>(sum / f32(count), 1.0);
+    return held(sum / f32(count));
 }

@@ -28,7 +28,7 @@ fn differs(a: vec2<i32>, b: vec2<i32>) -> bool {
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let size = textureDimensions(places);
-    let i = id.x + id.y * 65536u;
+    let i = id.x + id.y * ROW;
     if i >= size.x * size.y {
         return;
     }

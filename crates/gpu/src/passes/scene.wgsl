@@ -19,7 +19,12 @@ struct View {
     down: vec3<f32>,
     // 1: only where `mask` is not 0.
     masked: u32,
-    filtering: Filtering,
+    // The filter, as `Filtering` has it.
+    max_taps: u32,
+    parts: u32,
+    lod_bias: f32,
+    // The most light that the target can hold.
+    brightest: f32,
 }
 
 struct Vertex {

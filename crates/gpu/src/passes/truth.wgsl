@@ -1,22 +1,6 @@
 // Draws the truth: each sample shades one texel of the finest level as it is. No method is in here; compare truth/mod.rs of the
 // CPU renderer.
 
-// What the shared view says of filters is not asked here.
-struct Filtering {
-    max_taps: u32,
-    parts: u32,
-    lod_bias: f32,
-    levels: u32,
-}
-
-struct Material {
-    plain: Finish,
-    texels: vec2<f32>,
-    mapped: u32,
-    repeat: u32,
-    reflection: Reflection,
-}
-
 @group(1) @binding(0) var<uniform> material: Material;
 @group(1) @binding(1) var normals: texture_2d<f32>;
 @group(1) @binding(2) var finish_map: texture_2d_array<f32>;

@@ -97,14 +97,14 @@ pub(super) struct Render {
     /// Display values are sRGB of light times this
     #[arg(long, value_parser = positive)]
     exposure: Option<f64>,
-    /// How highlights are brought into a PNG's range: cut off (clip), or compressed (reinhard)
+    /// How highlights are brought into the range of the PNG that `-o` writes: cut off (clip), or compressed (reinhard)
     #[arg(long, default_value = "clip", value_parser = tone)]
     tone: Tone,
     /// What renders
     #[arg(long, value_enum, default_value_t = Device::Auto)]
     device: Device,
     /// The GPU's own sampler filters maps in place of `--filter`: trilinear, or with up to TAPS taps
-    #[arg(long, value_name = "TAPS", num_args = 0..=1, default_missing_value = "1", conflicts_with_all = ["neighbours", "filter"],
+    #[arg(long, value_name = "TAPS", num_args = 0..=1, default_missing_value = "1", conflicts_with_all = ["neighbours", "filter", "lod_bias"],
         value_parser = clap::value_parser!(u16).range(1..=16))]
     sampler: Option<u16>,
     /// The GPU smooths outlines by four samples a pixel, as applications do, in place of 4 x 4 parts
@@ -311,6 +311,12 @@ impl Render {
         if self.sparkle {
             check_drift(self.size)?;
         }
+        if self.sampler.is_some()
+            && let Some(method) = methods.iter().find(|m| !m.filterable())
+        {
+            let why = "cannot be filtered, and has no use for `--sampler`";
+            return Err(Failure::Usage(format!("{} {why}", method.spelling())));
+        }
         let stage = self.stage(baked)?;
         let times = match self.frames {
             Some(1) => vec![0.0],
@@ -366,7 +372,14 @@ impl Render {
     ) -> Result<Reel, Failure> {
         #[cfg(feature = "gpu")]
         if let Some(device) = self.device.open()? {
-            return shoot(&Gpu::new(&device, self.sampler, self.multisample), shot, each);
+            let shot_there = shoot(&Gpu::new(&device, self.sampler, self.multisample), shot, each);
+            match shot_there {
+                // What this GPU cannot do, the processor can; `auto` asked for no more than a picture.
+                Err(Failure::Failed(why)) if self.device == Device::Auto => {
+                    eprintln!("ndfmap: {why}: rendering on the processor");
+                }
+                done => return done,
+            }
         }
         #[cfg(not(feature = "gpu"))]
         if self.device == Device::Gpu {
@@ -385,6 +398,9 @@ impl Render {
         let file = |path: &&Path| !path.to_str().is_some_and(|p| p.starts_with(BUILTIN_PREFIX));
         let Some(path) = self.map.as_deref().filter(file) else { return Ok(None) };
         let Some(map) = read_ndf(path, &read_file(path)?)? else { return Ok(None) };
+        if !map.header.attributes.is_empty() {
+            warn(path, "the attributes that its lobes carry are not used: scenes bring their own colours");
+        }
         Ok(Some(BakedSurface { method: map.method(path)?, pyramid: map.pyramid }))
     }
 

@@ -60,6 +60,11 @@ impl Shader {
             eprintln!("ndfmap: wrote {}", file.display());
         }
         if json {
+            // Without a file the text is in the document; what is no text needs one.
+            let text = if self.output.is_some() { None } else { Some(String::from_utf8(bytes.clone())) };
+            let text = text.transpose().map_err(|_| {
+                Failure::Usage(format!("{} is no text: name a file with `-o`", language.name))
+            })?;
             return print_json(&json!({
                 "method": method.spelling(),
                 "brdf": reflection.lobe.spelling(),
@@ -68,6 +73,7 @@ impl Shader {
                 "layers": method.layers(),
                 "bytes": bytes.len(),
                 "output": self.output,
+                "text": text,
             }));
         }
         if self.output.is_none() { print_bytes(&bytes) } else { Ok(()) }

@@ -4,8 +4,8 @@ use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{Material, Scene};
 use ndfmap_gpu::{
-    Canvas, Device, Effort, FinestMaps, Geometry, GpuError, LEAST_SAMPLES, Lookups, Maps, Outlines, Renderer,
-    Sampling, Shown,
+    Canvas, Device, Effort, FinestMaps, Geometry, GpuError, Lookups, Maps, Outlines, Renderer, Sampling,
+    Shown,
 };
 use ndfmap_trace::filtered;
 use ndfmap_trace::truth::{self, TruePicture};
@@ -25,7 +25,11 @@ pub(crate) struct Gpu<'a> {
 
 impl From<GpuError> for Failure {
     fn from(error: GpuError) -> Self {
-        Self::Failed(format!("{error} (`--device cpu` renders without a GPU)"))
+        match error {
+            // No device is to blame.
+            GpuError::Shader(_) => Self::Failed(error.to_string()),
+            _ => Self::Failed(format!("{error} (`--device cpu` renders without a GPU)")),
+        }
     }
 }
 
@@ -53,6 +57,7 @@ impl Engine for Gpu<'_> {
             "device": "gpu",
             "adapter": self.device.description(),
             "clock": if self.device.has_timestamps() { "device" } else { "wall" },
+            "sampler": self.sampler,
             "outlines": if self.outlines == Outlines::Parts { "parts" } else { "multisampled" },
         })
     }
@@ -79,19 +84,9 @@ impl Engine for Gpu<'_> {
     ) -> Result<TruePicture, Failure> {
         let canvas = Canvas::new(self.device, view.size, Outlines::Sharp)?;
         let finest = FinestMaps::new(self.device, &view.scene.materials)?;
-        let with = |samples| {
-            let effort = Effort { samples, progress };
-            self.renderer.truth(&canvas, &Self::shown(view), &finest, &effort)
-        };
-        // Where a noise is asked for: twice as many until it is reached.
-        let mut samples = if effort.noise > 0.0 { LEAST_SAMPLES.min(effort.rays) } else { effort.rays };
-        loop {
-            let truth = with(samples)?;
-            if truth.noise <= effort.noise || samples >= effort.rays {
-                return Ok(TruePicture { picture: truth.picture, rays: truth.samples, noise: truth.noise });
-            }
-            samples = (2 * samples).min(effort.rays);
-        }
+        let effort = Effort { samples: effort.rays, noise: effort.noise, progress };
+        let truth = self.renderer.truth(&canvas, &Self::shown(view), &finest, &effort)?;
+        Ok(TruePicture { picture: truth.picture, rays: truth.samples, noise: truth.noise })
     }
 
     fn draw(
