@@ -32,6 +32,8 @@ struct Finish {
     specular: vec3<f32>,
 }
 
+alias Table = array<vec4<f32>, 3 * TABLE>;
+
 // A lobe in a model: everything about a material that does not change over its surface.
 struct Reflection {
     // The lobe's own number; see its file.
@@ -44,31 +46,28 @@ struct Reflection {
     gloss: f32,
     span: f32,
     // What the method wants to know of the lobe, entry by entry, three of these each: at eleven glosses, and of the diffuse lobe.
-    table: array<vec4<f32>, 3 * TABLE>,
+    table: Table,
 }
 
-// Gloss k of the table: by equal steps of its root, 0 to 10.
-fn tabulated_gloss(reflection: Reflection, k: u32) -> f32 {
-    let t = f32(k) / 10.0;
-    return reflection.gloss + reflection.span * t * t;
-}
-
-// An entry of the table at any gloss: between two that it has, each carried on as heat spreads on a sphere, at the rate `decay`.
-fn tabulated(reflection: Reflection, entry: u32, gloss: f32, decay: f32) -> f32 {
-    if reflection.span <= 0.0 {
-        return reflection.table[3u * entry].x;
+// An entry of the table at any gloss: between two that it has, by equal steps of the root, each carried on as heat spreads on a sphere, at
+// the rate `decay`. `range` is the least gloss and the span. (The table comes by pointer: copied for every entry, it is what time goes into.)
+fn tabulated(table: ptr<function, Table>, range: vec2<f32>, entry: u32, gloss: f32, decay: f32) -> f32 {
+    if range.y <= 0.0 {
+        return (*table)[3u * entry].x;
     }
-    let t = 10.0 * sqrt(clamp((gloss - reflection.gloss) / reflection.span, 0.0, 1.0));
+    let t = 10.0 * sqrt(clamp((gloss - range.x) / range.y, 0.0, 1.0));
     let k = min(u32(t), 9u);
     let i = k + 1u;
-    let below = reflection.table[3u * entry + k / 4u][k % 4u] * exp(decay * (tabulated_gloss(reflection, k) - gloss));
-    let above = reflection.table[3u * entry + i / 4u][i % 4u] * exp(decay * (tabulated_gloss(reflection, i) - gloss));
+    let at = range.x + range.y * vec2<f32>(f32(k * k), f32(i * i)) / 100.0;
+    let carried = exp(decay * (at - gloss));
+    let below = (*table)[3u * entry + k / 4u][k % 4u] * carried.x;
+    let above = (*table)[3u * entry + i / 4u][i % 4u] * carried.y;
     return mix(below, above, t - f32(k));
 }
 
 // An entry of the diffuse lobe's table.
-fn tabulated_diffuse(reflection: Reflection, entry: u32) -> f32 {
-    return reflection.table[3u * entry + 2u].w;
+fn tabulated_diffuse(table: ptr<function, Table>, entry: u32) -> f32 {
+    return (*table)[3u * entry + 2u].w;
 }
 
 // The path between two unit vectors. Only where both are above the surface (z > 0) is anything reflected.

@@ -16,7 +16,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let a = input[first];
     let b = input[first + 1u];
     let c = input[first + 2u];
-    var reflection = Reflection(a.x, u32(a.y), u32(a.z), a.w, c.w, array<vec4<f32>, 3 * TABLE>());
+    var reflection = Reflection(a.x, u32(a.y), u32(a.z), a.w, c.w, Table());
     for (var k = 0u; k < 3u * TABLE; k++) {
         reflection.table[k] = input[first + HEAD + k];
     }

@@ -153,7 +153,8 @@ fn on_plane(g: ptr<function, Decoded>, base: f32, energy: f32, w: vec3<f32>) -> 
 
 fn effective(g: ptr<function, Decoded>, reflection: Reflection, gloss: f32, w: vec3<f32>) -> f32 {
     let base = brdf_widen(reflection.base, gloss);
-    let energy = tabulated(reflection, 0u, gloss, 0.0);
+    var table = reflection.table;
+    let energy = tabulated(&table, vec2<f32>(reflection.gloss, reflection.span), 0u, gloss, 0.0);
     if NORMALISATION == PLANE {
         return on_plane(g, base, energy, w);
     }

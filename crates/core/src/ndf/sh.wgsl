@@ -50,17 +50,19 @@ fn series(gamma: ptr<function, Decoded>, rho: ptr<function, array<f32, TABLE>>, 
 }
 
 fn effective(gamma: ptr<function, Decoded>, reflection: Reflection, gloss: f32, w: vec3<f32>) -> f32 {
+    var table = reflection.table;
     var rho: array<f32, TABLE>;
     for (var l = 0u; l <= ORDER; l++) {
-        rho[l] = tabulated(reflection, l, gloss, 0.5 * f32(l * (l + 1u)));
+        rho[l] = tabulated(&table, vec2<f32>(reflection.gloss, reflection.span), l, gloss, 0.5 * f32(l * (l + 1u)));
     }
     return series(gamma, &rho, w);
 }
 
 fn effective_diffuse(gamma: ptr<function, Decoded>, reflection: Reflection, w: vec3<f32>) -> f32 {
+    var table = reflection.table;
     var rho: array<f32, TABLE>;
     for (var l = 0u; l <= ORDER; l++) {
-        rho[l] = tabulated_diffuse(reflection, l);
+        rho[l] = tabulated_diffuse(&table, l);
     }
     return series(gamma, &rho, w);
 }
