@@ -6,8 +6,9 @@ use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::lookup::{Lookup, Texels};
 use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid::{Precision, Pyramid};
-use ndfmap_core::scene::{BakedMaterial, Material};
+use ndfmap_core::scene::{BakedMaterial, FinishMap, Material};
 use ndfmap_core::surface::{SurfaceRow, Wrap, Wraps};
+use ndfmap_core::units::SlopeVariance;
 
 use crate::{Device, GpuError};
 
@@ -19,6 +20,8 @@ pub(crate) struct Textures {
     pub(crate) attributes: usize,
     /// Colours in `finish`.
     pub(crate) mapped: u32,
+    /// The least and the most gloss, where it is mapped.
+    pub(crate) gloss: Option<(SlopeVariance, SlopeVariance)>,
     pub(crate) size: Size,
     pub(crate) wraps: Wraps,
 }
@@ -46,19 +49,21 @@ impl<'a> Maps<'a> {
         let one = |(i, material): (usize, &Material)| {
             let progress = |f: f64| progress((i as f64 + f) / count);
             let baked = BakedMaterial::new(material, method, precision, &progress);
-            Textures::new(device, &material.name, &baked)
+            Textures::new(device, material, &baked)
         };
         Ok(Self { method, materials: materials.iter().enumerate().map(one).collect::<Result<_, _>>()? })
     }
 }
 
 impl Textures {
-    fn new(device: &Device, name: &str, baked: &BakedMaterial) -> Result<Self, GpuError> {
+    fn new(device: &Device, material: &Material, baked: &BakedMaterial) -> Result<Self, GpuError> {
+        let name = &material.name;
         Ok(Self {
             map: upload_pyramid(device, &format!("the map of material `{name}`"), &baked.pyramid)?,
             finish: finish(device, name, &baked.finish, baked.pyramid.wraps(), true)?,
             attributes: baked.attributes,
             mapped: baked.finish.len() as u32,
+            gloss: material.finish_map.as_ref().map(FinishMap::gloss_range),
             size: baked.pyramid.sizes()[0],
             wraps: baked.pyramid.wraps(),
         })
@@ -83,6 +88,7 @@ impl Textures {
             finish: finish(device, &material.name, &grids, wraps, false)?,
             attributes: 0,
             mapped: grids.len() as u32,
+            gloss: None,
             size,
             wraps,
         })

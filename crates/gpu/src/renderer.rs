@@ -191,9 +191,7 @@ impl<'a> Renderer<'a> {
         let one = |(material, textures): (&Material, &Textures)| {
             let lobe = &*material.reflection.lobe;
             let pipeline = self.pipelines.draw((maps.method, lobe), textures.attributes, entry, outlines)?;
-            let place = (textures.size, textures.wraps);
-            let bytes =
-                uniforms::material(material, place, textures.mapped, Some(maps.method), lookups.at_means);
+            let bytes = uniforms::material(material, textures, Some(maps.method), lookups.at_means);
             let sampler = sampler(self.device, textures.wraps, anisotropy);
             let group = self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("material"),
@@ -214,8 +212,7 @@ impl<'a> Renderer<'a> {
     pub(crate) fn dress_finest(&self, scene: &Scene, finest: &[Textures]) -> Result<Vec<Dressed>, GpuError> {
         let one = |(material, textures): (&Material, &Textures)| {
             let pipeline = self.pipelines.truth(&*material.reflection.lobe)?;
-            let place = (textures.size, textures.wraps);
-            let bytes = uniforms::material(material, place, textures.mapped, None, false);
+            let bytes = uniforms::material(material, textures, None, false);
             let group = self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("finest"),
                 layout: &self.pipelines.finest,

@@ -7,10 +7,11 @@ use ndfmap_core::light::Light;
 use ndfmap_core::lookup::Filtering;
 use ndfmap_core::ndf::Method;
 use ndfmap_core::scene::{Camera, Material};
-use ndfmap_core::surface::{Wrap, Wraps};
+use ndfmap_core::surface::Wrap;
 
 use crate::canvas::Canvas;
 use crate::geometry::Geometry;
+use crate::maps::Textures;
 use crate::renderer::Sampling;
 
 /// `View` in `scene.wgsl`.
@@ -100,12 +101,11 @@ impl LightUniform {
 /// `Material` in `draw.wgsl`, with its table at the end.
 pub(crate) fn material(
     material: &Material,
-    (size, wraps): (Size, Wraps),
-    mapped: u32,
+    textures: &Textures,
     method: Option<&dyn Method>,
     at_means: bool,
 ) -> Vec<u8> {
-    let finish = material.finish;
+    let (finish, size, wraps, mapped) = (material.finish, textures.size, textures.wraps, textures.mapped);
     let bit = |wrap: Wrap, bit: u32| if wrap == Wrap::Repeat { bit } else { 0 };
     let gloss = finish.gloss.get() as f32;
     let mut bytes = Vec::new();
@@ -118,7 +118,7 @@ pub(crate) fn material(
     four([f(size.width as f64), f(size.height as f64), mapped.to_le_bytes(), repeat.to_le_bytes()]);
     let reflection = &material.reflection;
     let model = reflection.model.index().to_le_bytes();
-    let (least, most) = material.gloss_range();
+    let (least, most) = textures.gloss.unwrap_or((finish.gloss, finish.gloss));
     four([f(reflection.lobe.base()), model, u32::from(at_means).to_le_bytes(), f(least.get())]);
     four([f(most.get() - least.get()), [0; 4], [0; 4], [0; 4]]);
     let table = method.map_or_else(|| vec![[0.0; 12]], |method| method.shader_table(reflection, least, most));

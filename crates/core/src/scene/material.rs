@@ -26,6 +26,14 @@ impl FinishMap {
         Self::finish(of(&self.diffuse_gloss), self.specular.as_deref().map(of), specular)
     }
 
+    /// The least and the most gloss of any texel.
+    #[must_use]
+    pub fn gloss_range(&self) -> (SlopeVariance, SlopeVariance) {
+        let all = || self.diffuse_gloss.texels().iter().map(|texel| texel[3].max(0.0));
+        let (least, most) = (all().fold(f32::INFINITY, f32::min), all().fold(0.0, f32::max));
+        (SlopeVariance::clamped(least.into()), SlopeVariance::clamped(most.into()))
+    }
+
     /// The maps one by one: albedo and gloss, and specular colour where it changes.
     #[must_use]
     pub fn grids(&self) -> Vec<Grid<[f32; 4]>> {
@@ -52,17 +60,6 @@ impl FinishMap {
             [r.max(s[0]), g.max(s[1]), b.max(s[2]), gloss]
         };
         Self { diffuse_gloss: Grid::from_fn(specular.size(), brighter).into(), specular: None }
-    }
-}
-
-impl Material {
-    /// The least and the most gloss of any texel.
-    #[must_use]
-    pub fn gloss_range(&self) -> (SlopeVariance, SlopeVariance) {
-        let Some(map) = &self.finish_map else { return (self.finish.gloss, self.finish.gloss) };
-        let all = || map.diffuse_gloss.texels().iter().map(|texel| texel[3].max(0.0));
-        let (least, most) = (all().fold(f32::INFINITY, f32::min), all().fold(0.0, f32::max));
-        (SlopeVariance::clamped(least.into()), SlopeVariance::clamped(most.into()))
     }
 }
 
