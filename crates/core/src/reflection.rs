@@ -21,6 +21,11 @@ pub enum Model {
     Han,
     /// Walter et al. 2007, equation 20: `c = G/(4 n·wo)`, G Smith's for the lobe's own width, Schlick's F.
     Smith,
+    /// Dupuy et al. 2013 without shadowing: `c = 1/(4 n·wo (1 + Lambda(wo)))`, Schlick's F. Facets hide each other from the eye, and from
+    /// no light.
+    Masked,
+    /// Dupuy et al. 2013 in full: `c = 1/(4 n·wo (1 + Lambda(wo) + Lambda(wi)))`, Schlick's F.
+    Shadowed,
 }
 
 /// Least `n·wo` that Tan et al.'s model divides by: a normal turned further from the eye counts as one at 87 degrees.
@@ -28,7 +33,7 @@ pub const LEAST_COSINE: f64 = 0.05;
 
 impl Model {
     /// Every model.
-    pub const ALL: [Self; 3] = [Self::Tan, Self::Han, Self::Smith];
+    pub const ALL: [Self; 5] = [Self::Tan, Self::Han, Self::Smith, Self::Masked, Self::Shadowed];
 
     /// As spelled on the command line.
     #[must_use]
@@ -37,6 +42,8 @@ impl Model {
             Self::Tan => "tan",
             Self::Han => "han",
             Self::Smith => "smith",
+            Self::Masked => "masked",
+            Self::Shadowed => "shadowed",
         }
     }
 
@@ -51,7 +58,7 @@ impl Model {
     pub fn fresnel(self, specular: DVec3, u: f64) -> DVec3 {
         match self {
             Self::Han => specular,
-            Self::Tan | Self::Smith => specular + (DVec3::ONE - specular) * (1.0 - u).clamp(0.0, 1.0).powi(5),
+            _ => specular + (DVec3::ONE - specular) * (1.0 - u).clamp(0.0, 1.0).powi(5),
         }
     }
 
@@ -60,7 +67,7 @@ impl Model {
     pub fn diffuse_share(self, fresnel: DVec3) -> DVec3 {
         match self {
             Self::Han => DVec3::ONE,
-            Self::Tan | Self::Smith => DVec3::ONE - fresnel,
+            _ => DVec3::ONE - fresnel,
         }
     }
 }
@@ -82,9 +89,13 @@ impl Way {
     /// The path between two unit vectors; `None` where light or eye is below the surface, and nothing is reflected.
     #[must_use]
     pub fn new(wi: DVec3, wo: DVec3) -> Option<Self> {
-        if wi.z <= 0.0 || wo.z <= 0.0 {
-            return None;
-        }
+        if wi.z <= 0.0 || wo.z <= 0.0 { None } else { Self::between(wi, wo) }
+    }
+
+    /// The path between two unit vectors, be they below the base surface: displaced facets may face them still. `None` only for a light
+    /// right behind what is seen, which has no half-vector.
+    #[must_use]
+    pub fn between(wi: DVec3, wo: DVec3) -> Option<Self> {
         let wh = (wi + wo).try_normalize()?;
         Some(Self { wi, wo, wh, u: wi.dot(wh) })
     }
@@ -135,7 +146,20 @@ impl Reflection {
                 let width = self.width(gloss);
                 self.lobe.masking(i, width) * self.lobe.masking(o, width) / (4.0 * o)
             }
+            Model::Masked | Model::Shadowed if o <= 0.0 => 0.0,
+            Model::Masked => 0.25 / self.visible_area(o, gloss),
+            Model::Shadowed if i <= 0.0 => 0.0,
+            Model::Shadowed => {
+                let hidden_from_light = self.visible_area(i, gloss) / i - 1.0;
+                0.25 / (self.visible_area(o, gloss) + o * hidden_from_light)
+            }
         }
+    }
+
+    /// Projected area of what a facet is made of, as it faces a direction at this cosine.
+    fn visible_area(&self, cosine: f64, gloss: SlopeVariance) -> f64 {
+        let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+        self.lobe.visible_area(cosine, sine * self.width(gloss).get().sqrt())
     }
 
     /// Light that one normal sends along the way, per unit of irradiance.

@@ -6,6 +6,8 @@ const PI: f32 = 3.14159265358979;
 const TAN: u32 = 0u;
 const HAN: u32 = 1u;
 const SMITH: u32 = 2u;
+const MASKED: u32 = 3u;
+const SHADOWED: u32 = 4u;
 
 // Least n·wo that Tan et al.'s model divides by.
 const LEAST_COSINE: f32 = 0.05;
@@ -38,7 +40,7 @@ alias Table = array<vec4<f32>, 3 * TABLE>;
 struct Reflection {
     // The lobe's own number; see its file.
     base: f32,
-    // TAN, HAN or SMITH.
+    // TAN, HAN, SMITH, MASKED or SHADOWED.
     model: u32,
     // 1: factors are taken at the lobes' means, as the papers print it.
     at_means: u32,
@@ -96,6 +98,11 @@ fn lobe_width(reflection: Reflection, gloss: f32) -> f32 {
     return brdf_variance(reflection.base) + gloss;
 }
 
+// Projected area of what a facet is made of, as it faces a direction at this cosine.
+fn visible_area(width: f32, cosine: f32) -> f32 {
+    return brdf_visible_area(cosine, sqrt(max(1.0 - cosine * cosine, 0.0) * width));
+}
+
 // The factor c at a normal, for the lobe that the gloss makes.
 fn factor(reflection: Reflection, n: vec3<f32>, way: Way, gloss: f32) -> f32 {
     let i = dot(n, way.wi);
@@ -106,10 +113,17 @@ fn factor(reflection: Reflection, n: vec3<f32>, way: Way, gloss: f32) -> f32 {
     if reflection.model == HAN {
         return max(i, 0.0);
     }
-    if i <= 0.0 || o <= 0.0 {
+    if o <= 0.0 || (i <= 0.0 && reflection.model != MASKED) {
         return 0.0;
     }
     let width = lobe_width(reflection, gloss);
+    if reflection.model == MASKED {
+        return 0.25 / visible_area(width, o);
+    }
+    if reflection.model == SHADOWED {
+        let hidden_from_light = visible_area(width, i) / i - 1.0;
+        return 0.25 / (visible_area(width, o) + o * hidden_from_light);
+    }
     return brdf_masking(i, width) * brdf_masking(o, width) / (4.0 * o);
 }
 

@@ -18,13 +18,21 @@ pub struct Shader {
     pub table: usize,
     /// Its text.
     pub sources: &'static [&'static str],
+    /// True when its text has `reflect_displaced` for itself: it knows of displacement.
+    pub displaces: bool,
 }
 
 impl Shader {
     /// One without constants or a table.
     #[must_use]
     pub(crate) fn new(sources: &'static [&'static str]) -> Self {
-        Self { constants: String::new(), table: 1, sources }
+        Self { constants: String::new(), table: 1, sources, displaces: false }
+    }
+
+    /// One whose text has `reflect_displaced`.
+    #[must_use]
+    pub(crate) fn displaces(self) -> Self {
+        Self { displaces: true, ..self }
     }
 
     /// Adds a constant.
@@ -93,7 +101,8 @@ pub fn link(method: &dyn Method, lobe: &dyn Brdf, attributes: usize) -> String {
     ];
     let mut text: String = constants.iter().map(|(name, value)| value.declare(name)).collect();
     text += &own.constants;
-    for source in SHARED.iter().chain([&lobe.shader()]).chain(own.sources) {
+    let plain: &[&str] = if own.displaces { &[] } else { &[include_str!("ndf/undisplaced.wgsl")] };
+    for source in SHARED.iter().chain([&lobe.shader()]).chain(own.sources).chain(plain) {
         text.push('\n');
         text += source;
     }

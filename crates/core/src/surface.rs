@@ -89,13 +89,16 @@ pub struct SurfaceRow {
     pub z: Vec<f32>,
     /// Height; zero where the map has none.
     pub height: Vec<f32>,
+    /// Covariance of the slopes within each texel (xx, yy, xy), around that of its normal; empty where nothing is known of it.
+    pub spread: Vec<[f32; 3]>,
 }
 
 impl SurfaceRow {
     /// A flat row of `width` texels.
     #[must_use]
     pub fn flat(width: usize) -> Self {
-        Self { x: vec![0.0; width], y: vec![0.0; width], z: vec![1.0; width], height: vec![0.0; width] }
+        let zeros = vec![0.0; width];
+        Self { x: zeros.clone(), y: zeros.clone(), z: vec![1.0; width], height: zeros, spread: Vec::new() }
     }
 
     /// Number of texels.
@@ -174,6 +177,36 @@ pub enum SlopeFilter {
     CentralDifference,
     /// The 3×3 Sobel kernel: smooths across the derivative; OpenImageIO's default.
     Sobel,
+    /// Of the bilinear surface through the heights, mean and covariance over each texel, exactly: what is displaced has those slopes.
+    Bilinear,
+}
+
+/// Mean slope over a texel of the bilinear surface through the 3 × 3 heights around it, and the covariance (xx, yy, xy), per texel; rows
+/// from above to below, y up.
+///
+/// A texel is a quarter each of the four cells between heights. In a cell, from the height h at its corner on, the surface is
+/// `h + d a + e b + c a b`, so over the quarter `0 <= a, b <= 1/2` the slopes `d + c b` and `e + c a` have means `d + c/4` and `e + c/4`,
+/// variances `c²/48` each, and are not correlated.
+fn bilinear_slopes(heights: [[f32; 3]; 3]) -> (Vec2, [f32; 3]) {
+    let [_, [_, middle, _], _] = heights;
+    let mut quarters = [Vec2::ZERO; 4];
+    let mut within = 0.0;
+    for (k, quarter) in quarters.iter_mut().enumerate() {
+        let (i, j) = (2 * (k % 2), 2 * (k / 2));
+        let (d, e) = (heights[1][i] - middle, heights[j][1] - middle);
+        let c = heights[j][i] - heights[1][i] - heights[j][1] + middle;
+        // To the left and below, the cell's own axes run against the frame's.
+        let signs = Vec2::new(i as f32 - 1.0, 1.0 - j as f32);
+        *quarter = Vec2::new(d + c / 4.0, e + c / 4.0) * signs;
+        within += c * c / 48.0 / 4.0;
+    }
+    let mean = quarters.iter().sum::<Vec2>() / 4.0;
+    let mut covariance = [within, within, 0.0];
+    for strays in quarters.map(|q| q - mean) {
+        let products = [strays.x * strays.x, strays.y * strays.y, strays.x * strays.y];
+        covariance.iter_mut().zip(products).for_each(|(sum, p)| *sum += p / 4.0);
+    }
+    (mean, covariance)
 }
 
 /// A height map, with slopes taken when read.
@@ -206,6 +239,7 @@ impl Surface for HeightField {
         let (above, here, below) = (line(-1), line(0), line(1));
         // A texel is 1/width of the texture's width across, on both axes.
         let per_texel = width as f32;
+        row.spread.clear();
         let mut set = |i: usize, l: usize, r: usize| {
             let slope = match self.filter {
                 SlopeFilter::CentralDifference => Vec2::new(here[r] - here[l], above[i] - below[i]) * 0.5,
@@ -213,6 +247,12 @@ impl Surface for HeightField {
                     let dx = (above[r] - above[l]) + 2.0 * (here[r] - here[l]) + (below[r] - below[l]);
                     let dy = (above[l] - below[l]) + 2.0 * (above[i] - below[i]) + (above[r] - below[r]);
                     Vec2::new(dx, dy) * 0.125
+                }
+                SlopeFilter::Bilinear => {
+                    let around = [above, here, below].map(|row| [row[l], row[i], row[r]]);
+                    let (slope, spread) = bilinear_slopes(around);
+                    row.spread.push(spread.map(|s| s * per_texel * per_texel));
+                    slope
                 }
             } * per_texel;
             row.set_normal(i, normal_of_slope(slope));
@@ -299,6 +339,42 @@ mod tests {
                 let expected = Vec2::new(2.0 * c, c);
                 assert!((got - expected).length() < 2e-3 * 0.14, "{filter:?} at {i}: {got} for {expected}");
             }
+        }
+    }
+
+    #[test]
+    fn bilinear_slopes_are_those_of_the_surface_between_the_heights() {
+        // Known answer: the mean over many places of a texel of the surface's own differences.
+        let heights = [[0.3, -0.1, 0.25], [0.7, 0.2, -0.4], [0.05, 0.6, 0.1]].map(|row| row.map(|h: f32| h));
+        // At (x, y) from the middle texel, y up, each -1 to 1.
+        let height = |x: f64, y: f64| {
+            let pair = |t: f64| if t < 0.0 { (0, t + 1.0) } else { (1, t) };
+            let ((i, s), (j, t)) = (pair(x), pair(-y));
+            let h = |i: usize, j: usize| f64::from(heights[j][i]);
+            (h(i, j) * (1.0 - s) + h(i + 1, j) * s) * (1.0 - t)
+                + (h(i, j + 1) * (1.0 - s) + h(i + 1, j + 1) * s) * t
+        };
+        let n = 64;
+        let at = |k: usize| (k as f64 + 0.5) / f64::from(n as u32) - 0.5;
+        let slope = |x: f64, y: f64| {
+            let step = 1e-5;
+            let d = |a: f64, b: f64| (a - b) / (2.0 * step);
+            (d(height(x + step, y), height(x - step, y)), d(height(x, y + step), height(x, y - step)))
+        };
+        let all: Vec<(f64, f64)> = (0..n * n).map(|k| slope(at(k % n), at(k / n))).collect();
+        let mean = |f: &dyn Fn(&(f64, f64)) -> f64| all.iter().map(f).sum::<f64>() / all.len() as f64;
+        let (x, y) = (mean(&|s| s.0), mean(&|s| s.1));
+        let expected = [
+            x,
+            y,
+            mean(&|s| (s.0 - x).powi(2)),
+            mean(&|s| (s.1 - y).powi(2)),
+            mean(&|s| (s.0 - x) * (s.1 - y)),
+        ];
+        let (got, [xx, yy, xy]) = bilinear_slopes(heights);
+        for (got, expected) in [got.x, got.y, xx, yy, xy].into_iter().zip(expected) {
+            // The midpoint rule over 64 × 64 places errs by 1/(12 × 64²) of the slopes' own change, which is of order 1.
+            assert!((f64::from(got) - expected).abs() < 2e-4, "{got} for {expected}");
         }
     }
 

@@ -35,7 +35,7 @@ fn all(language: &str) -> Vec<(String, Vec<u8>)> {
         // Every lobe and model comes up, though not with every method.
         let lobes: Vec<&str> = brdf::TABLE.iter().map(|row| row.samples[0]).collect();
         let lobe = brdf::parse(lobes[at % lobes.len()]).unwrap();
-        let reflection = Reflection { lobe, model: Model::ALL[at % 3] };
+        let reflection = Reflection { lobe, model: Model::ALL[at % Model::ALL.len()] };
         let method = ndf::parse(spelling).unwrap();
         let export = Export { method: &*method, reflection: &reflection };
         let bytes = export.to(language).unwrap_or_else(|e| panic!("{spelling}: {e}"));

@@ -10,7 +10,7 @@
 mod common;
 
 use common::device;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Mat2, Vec3};
 use ndfmap_core::bake::Bake;
 use ndfmap_core::brdf;
 use ndfmap_core::grid::Size;
@@ -41,6 +41,10 @@ struct Probe {
     normal: Vec3,
     at_means: bool,
     channels: Vec<f32>,
+    /// How slopes lie on the displaced surface.
+    by: Mat2,
+    /// Its base turns its back on the eye.
+    below: bool,
 }
 
 fn unit(v: DVec3) -> Vec3 {
@@ -85,7 +89,10 @@ fn probes(method: &dyn Method, count: usize) -> Vec<Probe> {
             gloss: SlopeVariance::clamped(f64::from(gloss as f32)),
         };
         let [wi, wo, normal] = [(); 3].map(|()| towards(&mut random));
-        Probe { finish, wi, wo, normal, at_means: i.is_multiple_of(5), channels }
+        let [a, b, c, d]: [f32; 4] = random.random();
+        let by = Mat2::from_cols_array(&[0.5 + a, 0.6 * b - 0.3, 0.6 * c - 0.3, 0.5 + d]);
+        let (at_means, below) = (i.is_multiple_of(5), i % 3 == 1);
+        Probe { finish, wi, wo, normal, at_means, channels, by, below }
     };
     (0..count).map(probe).collect()
 }
@@ -106,23 +113,39 @@ impl Question<'_> {
         out.extend([base, self.reflection.model.index() as f32, f32::from(probe.at_means), gloss]);
         out.extend(diffuse.as_vec3().extend(gloss).to_array());
         out.extend(specular.as_vec3().extend(0.0).to_array());
-        out.extend(probe.wi.extend(0.0).to_array());
+        out.extend(probe.wi.extend(self.side(probe)).to_array());
         out.extend(probe.wo.extend(0.0).to_array());
         out.extend(probe.normal.extend(0.0).to_array());
+        out.extend(probe.by.to_cols_array());
         out.extend(table.as_flattened());
         out.extend(&probe.channels);
     }
 
-    /// The eight numbers by the CPU.
-    fn answer(&self, probe: &Probe) -> [f64; 8] {
-        let Probe { finish, wi, wo, normal, at_means, channels } = probe;
+    /// -1 where the base of the displaced surface turns its back on the eye, as only methods that know of displacement can take.
+    fn side(&self, probe: &Probe) -> f32 {
+        if self.method.shader().displaces && probe.below { -1.0 } else { 1.0 }
+    }
+
+    /// The twelve numbers by the CPU.
+    fn answer(&self, probe: &Probe) -> [f64; OUTPUTS] {
+        let Probe { finish, wi, wo, normal, at_means, channels, by, .. } = probe;
         let lobe = &self.reflection.lobe;
         let way = Way::new(wi.as_dvec3(), wo.as_dvec3()).unwrap();
         let prepared = self.method.prepare(self.reflection, finish.gloss);
-        let texel =
-            FilteredTexel { channels, finish: &|_| *finish, prepared: &prepared, at_means: *at_means };
+        let texel = FilteredTexel {
+            channels,
+            finish: &|_| *finish,
+            prepared: &prepared,
+            at_means: *at_means,
+            relief: None,
+        };
         let light =
             self.method.reflect(&texel, self.reflection, &[Lit { way, irradiance: DVec3::ONE }]).to_array();
+        let eye = way.wo * DVec3::new(1.0, 1.0, self.side(probe).into());
+        let texel = FilteredTexel { relief: Some(by.as_dmat2()), ..texel };
+        let lit = Lit { way: Way::between(way.wi, eye).unwrap(), irradiance: DVec3::ONE };
+        let relief = self.method.reflect(&texel, self.reflection, &[lit]).to_array();
+        let visible = lobe.visible_area(eye.z, finish.gloss.get());
         let facet = self.reflection.facet(normal.as_dvec3(), finish, &way).x;
         let width = self.reflection.width(finish.gloss);
         let specular = self.reflection.is_specular();
@@ -139,11 +162,15 @@ impl Question<'_> {
             of_lobe(width.get()),
             masking,
             lambert.evaluate_widened(finish.gloss, way.wi.z),
+            relief[0],
+            relief[1],
+            relief[2],
+            if specular { visible } else { eye.z.max(0.0) },
         ]
     }
 
     /// What the answer may be off by.
-    fn allowed(&self, probe: &Probe, answer: &[f64; 8]) -> [f64; 8] {
+    fn allowed(&self, probe: &Probe, answer: &[f64; OUTPUTS]) -> [f64; OUTPUTS] {
         let mut allowed = answer.map(|a| RELATIVE * a.abs() + 1e-30);
         let mut moved = |other: Probe| {
             let changed = self.answer(&other);
@@ -151,6 +178,11 @@ impl Question<'_> {
                 *allowed += (a - b).abs();
             }
         };
+        for k in 0..4 {
+            let mut by = probe.by.to_cols_array();
+            by[k] *= 1.0 + INPUT_STEP;
+            moved(Probe { by: Mat2::from_cols_array(&by), ..probe.clone() });
+        }
         for axis in Vec3::AXES {
             moved(Probe { wi: probe.wi + axis * INPUT_STEP, ..probe.clone() });
             moved(Probe { normal: probe.normal + axis * INPUT_STEP, ..probe.clone() });
@@ -173,7 +205,23 @@ impl Question<'_> {
 }
 
 /// The outputs, in order, for messages.
-const NAMES: [&str; 8] = ["red", "green", "blue", "facet", "evaluate", "variance", "masking", "lambert"];
+const NAMES: [&str; OUTPUTS] = [
+    "red",
+    "green",
+    "blue",
+    "facet",
+    "evaluate",
+    "variance",
+    "masking",
+    "lambert",
+    "displaced red",
+    "displaced green",
+    "displaced blue",
+    "visible area",
+];
+
+/// How many there are.
+const OUTPUTS: usize = 12;
 
 /// Compares; returns the share of outputs within [`RELATIVE`] without the second allowance.
 fn compare(device: &Device, question: &Question<'_>, probes: &[Probe]) -> f64 {
@@ -187,21 +235,21 @@ fn compare(device: &Device, question: &Question<'_>, probes: &[Probe]) -> f64 {
     let mut input = Vec::new();
     probes.iter().for_each(|p| question.pack(p, &mut input));
     let count = probes.len() as u32;
-    let output = device.compute(&text, bytemuck::cast_slice(&input), 32 * u64::from(count), count);
+    let output = device.compute(&text, bytemuck::cast_slice(&input), 48 * u64::from(count), count);
     let output = output.unwrap_or_else(|e| panic!("{name}: {e}"));
     let output: Vec<f32> = bytemuck::pod_collect_to_vec(&output);
     let (mut within, mut all) = (0, 0);
-    for (i, (probe, got)) in probes.iter().zip(output.as_chunks::<8>().0).enumerate() {
+    for (i, (probe, got)) in probes.iter().zip(output.as_chunks::<OUTPUTS>().0).enumerate() {
         let answer = question.answer(probe);
         let plain = |k: usize| (f64::from(got[k]) - answer[k]).abs() <= RELATIVE * answer[k].abs() + 1e-30;
-        all += 8;
-        let exact = (0..8).filter(|k| plain(*k)).count();
+        all += OUTPUTS;
+        let exact = (0..OUTPUTS).filter(|k| plain(*k)).count();
         within += exact;
-        if exact == 8 {
+        if exact == OUTPUTS {
             continue;
         }
         let allowed = question.allowed(probe, &answer);
-        for k in 0..8 {
+        for k in 0..OUTPUTS {
             let error = (f64::from(got[k]) - answer[k]).abs();
             assert!(
                 error <= allowed[k],
@@ -229,7 +277,7 @@ fn every_method_agrees() {
         let method = ndf::parse(spelling).unwrap();
         let probes = probes(&*method, 500);
         for (k, lobe) in ["blinn-phong:50", "ggx:0.2"].into_iter().enumerate() {
-            let reflection = reflection(lobe, Model::ALL[(at + k) % 3]);
+            let reflection = reflection(lobe, Model::ALL[(at + k) % Model::ALL.len()]);
             let share = compare(&device, &Question { method: &*method, reflection: &reflection }, &probes);
             eprintln!("{spelling} {lobe}: {:.2} % within 1e-5", 100.0 * share);
         }
@@ -246,6 +294,22 @@ fn every_lobe_agrees_in_every_model() {
             let reflection = reflection(spelling, model);
             let share = compare(&device, &Question { method: &*method, reflection: &reflection }, &probes);
             eprintln!("{spelling} {}: {:.2} % within 1e-5", model.name(), 100.0 * share);
+        }
+    }
+}
+
+#[test]
+fn displaced_surfaces_agree() {
+    let Some(device) = device() else { return };
+    for method in ["slopes", "slopes:9"] {
+        let method = ndf::parse(method).unwrap();
+        let probes = probes(&*method, 2000);
+        for lobe in ["beckmann:0.05", "beckmann:0.4", "ggx:0.2", "lambert"] {
+            for model in [Model::Masked, Model::Shadowed] {
+                let reflection = reflection(lobe, model);
+                let share = compare(&device, &Question { method: &*method, reflection: &reflection }, &probes);
+                eprintln!("{} {lobe} {}: {:.2} % within 1e-5", method.spelling(), model.name(), 100.0 * share);
+            }
         }
     }
 }

@@ -1,6 +1,6 @@
 // Evaluates the twins at given inputs: `reflect_texel` as a whole, and the functions of a lobe one by one.
 
-const HEAD: u32 = 6u;
+const HEAD: u32 = 7u;
 const STRIDE: u32 = HEAD + 3u * TABLE + ALL_LAYERS;
 
 @group(0) @binding(0) var<storage, read> input: array<vec4<f32>>;
@@ -28,12 +28,19 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let plain = Finish(b.xyz, b.w, c.xyz);
     var decoded = decode(&channels);
     let light = reflect_texel(&channels, &decoded, plain, reflection, way);
-    output[2u * i] = vec4<f32>(light, facet(reflection, input[first + 5u].xyz, plain, way).x);
+    output[3u * i] = vec4<f32>(light, facet(reflection, input[first + 5u].xyz, plain, way).x);
     let widened = brdf_widen(a.x, b.w);
-    output[2u * i + 1u] = vec4<f32>(
+    output[3u * i + 1u] = vec4<f32>(
         brdf_evaluate(widened, input[first + 5u].z),
         brdf_variance(widened),
         brdf_masking(way.wo.z, brdf_variance(widened)),
         lambert_evaluate(b.w, way.wi.z),
     );
+    // The same texel on a displaced surface, whose base turns its back on every other eye.
+    let below = input[first + 3u].w;
+    let wo = vec3<f32>(way.wo.xy, below * way.wo.z);
+    let by = input[first + 6u];
+    let displaced = way_between(way.wi, wo);
+    let relief = reflect_displaced(&channels, &decoded, plain, reflection, displaced, mat2x2<f32>(by.xy, by.zw));
+    output[3u * i + 2u] = vec4<f32>(relief, brdf_visible_area(wo.z, b.w));
 }

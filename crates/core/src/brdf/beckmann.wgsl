@@ -27,3 +27,8 @@ fn brdf_variance(base: f32) -> f32 {
 fn brdf_masking(u: f32, width: f32) -> f32 {
     return beckmann_masking(u, width);
 }
+
+// Projected area of the facets that face a direction.
+fn brdf_visible_area(mean: f32, deviation: f32) -> f32 {
+    return mean_of_positive_part(mean, deviation * deviation);
+}

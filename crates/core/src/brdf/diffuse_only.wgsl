@@ -18,3 +18,7 @@ fn brdf_variance(base: f32) -> f32 {
 fn brdf_masking(u: f32, width: f32) -> f32 {
     return 1.0;
 }
+
+fn brdf_visible_area(mean: f32, deviation: f32) -> f32 {
+    return max(mean, 0.0);
+}

@@ -68,6 +68,14 @@ impl Brdf for Ggx {
         2.0 / (1.0 + (1.0 + 2.0 * width.get() * tan_squared).sqrt())
     }
 
+    /// The same equation read as an area, which holds for negative means too: slopes seen along a plane are Student's t of two degrees.
+    fn visible_area(&self, mean: f64, deviation: f64) -> f64 {
+        let spread = 2.0 * deviation * deviation;
+        let root = (mean * mean + spread).sqrt();
+        // The smaller of the two terms apart, lest they cancel.
+        if mean < 0.0 { spread / (root - mean) / 2.0 } else { (mean + root) / 2.0 }
+    }
+
     fn widen(&self, by: SlopeVariance) -> Box<dyn Brdf> {
         Box::new(self.widened(by))
     }

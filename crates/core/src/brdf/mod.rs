@@ -61,6 +61,13 @@ pub trait Brdf: Send + Sync + Debug {
         beckmann::masking(u, width)
     }
 
+    /// Area, projected along a direction, of the facets that face it: the mean of `max(X, 0)` for X of this mean and deviation, X being
+    /// distributed as slopes are for lobes of this kind. Beckmann's Gaussian, where a lobe has none of its own. Per unit of area that the
+    /// facets cover, and masking apart: [`Self::masking`] is the mean over this.
+    fn visible_area(&self, mean: f64, deviation: f64) -> f64 {
+        mean_of_positive_part(mean, deviation * deviation)
+    }
+
     /// Zonal coefficients `rho_l = 2 pi ∫ f(u) P_l(u) du` for l = 0..`order` (Han et al., equation 8).
     ///
     /// Closed forms or recurrences where there are any; else [`zonal_by_quadrature`].

@@ -9,6 +9,7 @@
 
 mod fixed;
 mod gmm;
+mod leadr;
 mod mixture;
 mod naive;
 mod ndm;
@@ -24,6 +25,7 @@ mod conformance;
 
 pub use fixed::Fixed;
 pub use gmm::{GaussianMixture, Gmm};
+pub use leadr::SlopeGrid;
 pub use mixture::{Cosine, Lobes, Shaded};
 pub use naive::Naive;
 pub use ndm::{Kernel, Ndm, Normalisation};
@@ -52,6 +54,8 @@ pub struct Sample {
     pub normal: Vec3,
     /// Height in texture widths; zero where the map has none.
     pub height: f32,
+    /// Covariance of the slopes within the texel: xx, yy, xy; zero where the map knows of none.
+    pub spread: [f32; 3],
 }
 
 /// A way to store a distribution of normals in a texel.
@@ -116,6 +120,11 @@ pub trait Representation: Debug + Send + Sync {
         None
     }
 
+    /// The slopes, and over which of them diffuse facets are averaged, for a method that knows of displacement.
+    fn displaced<'a>(&'a self, _lobes: &'a Self::Lobes) -> Option<(&'a SlopeGaussian, &'a leadr::SlopeGrid)> {
+        None
+    }
+
     /// The twin of decoding and shading, in WGSL.
     fn shader(&self) -> Shader;
 
@@ -149,7 +158,8 @@ pub trait Representation: Debug + Send + Sync {
         let mut texel = vec![0.0; 4 * layers];
         for i in 0..width {
             let mut sums = self.zero();
-            self.accumulate(&mut sums, &Sample { normal: row.normal(i), height: row.height[i] }, 1.0);
+            let spread = row.spread.get(i).copied().unwrap_or_default();
+            self.accumulate(&mut sums, &Sample { normal: row.normal(i), height: row.height[i], spread }, 1.0);
             self.pack(&sums, &mut texel);
             for (layer, rgba) in texel.as_chunks::<4>().0.iter().enumerate() {
                 channels[(layer * width + i) * 4..][..4].copy_from_slice(rgba);

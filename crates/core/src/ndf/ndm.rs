@@ -470,7 +470,11 @@ mod tests {
     fn sums_of(ndm: Ndm, normals: &[Vec3]) -> PoleMoments {
         let mut sums = ndm.zero();
         for normal in normals {
-            ndm.accumulate(&mut sums, &Sample { normal: *normal, height: 0.0 }, 1.0 / normals.len() as f32);
+            ndm.accumulate(
+                &mut sums,
+                &Sample { normal: *normal, height: 0.0, spread: [0.0; 3] },
+                1.0 / normals.len() as f32,
+            );
         }
         sums
     }

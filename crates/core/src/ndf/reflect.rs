@@ -6,9 +6,9 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec3;
+use glam::{DMat2, DVec3};
 
-use super::{Representation, Shaded, direction_or_up};
+use super::{Representation, Shaded, direction_or_up, leadr};
 use crate::brdf::{Brdf, Lambert};
 use crate::reflection::{Finish, Reflection, Way};
 use crate::units::SlopeVariance;
@@ -41,8 +41,10 @@ pub struct FilteredTexel<'a> {
     pub finish: &'a dyn Fn(Option<usize>) -> Finish,
     /// What was prepared for the material.
     pub prepared: &'a Prepared,
-    /// Take factors at the lobes' means, as the papers print it.
+    /// Shade as the papers print it: factors at the lobes' means; for displaced surfaces, the rational form of masking.
     pub at_means: bool,
+    /// For a displaced surface, how slopes of the map lie on it; `None` for a normal map.
+    pub relief: Option<DMat2>,
 }
 
 /// Light that a filtered texel sends to the eye.
@@ -53,6 +55,9 @@ pub(super) fn reflect<R: Representation + ?Sized>(
     lights: &[Lit],
 ) -> DVec3 {
     let decoded = representation.decode(&representation.unpack(texel.channels));
+    if let (Some(by), Some((slopes, grid))) = (texel.relief, representation.displaced(&decoded)) {
+        return leadr::reflect((&slopes.stretched(by), grid), texel, reflection, lights);
+    }
     let Some((cosine, lobes)) = representation.isotropic(&decoded) else {
         let finish = (texel.finish)(None);
         let Prepared { gloss, lobe, tables: [table, diffuse_table] } = texel.prepared;
@@ -112,7 +117,12 @@ fn answering(lobe: &Shaded, mu: DVec3, base: SlopeVariance, wh: DVec3) -> DVec3 
 }
 
 /// Puts colours on the specular and the diffuse part.
-fn together(reflection: &Reflection, finish: &Finish, way: &Way, (specular, diffuse): (f64, f64)) -> DVec3 {
+pub(super) fn together(
+    reflection: &Reflection,
+    finish: &Finish,
+    way: &Way,
+    (specular, diffuse): (f64, f64),
+) -> DVec3 {
     let diffuse = finish.diffuse * (diffuse.max(0.0) / PI);
     if !reflection.is_specular() {
         return diffuse;
@@ -180,6 +190,7 @@ mod tests {
                             finish: &|_| finish,
                             prepared: &prepared,
                             at_means,
+                            relief: None,
                         };
                         let lit = Lit { way, irradiance: DVec3::ONE };
                         method.reflect(&texel, &reflection, &[lit]).x

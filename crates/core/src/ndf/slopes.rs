@@ -7,28 +7,59 @@
 //! deviation. With no spread that is the lobe itself; for a Gaussian of angles it is LEAN's Gaussian.
 //! The density is per map area, `gamma = P22 / w.z³`, because that is how a normal map's texels weigh; LEAN's
 //! `D = P22 / w.z⁴` counts facet area and is brighter by 1/w.z where the map is steep (`docs/methods.md`
-//! has what that costs). Lambert is averaged over 5×5 slopes of the Gaussian, as in LEADR.
+//! has what that costs). Lambert is averaged over 5×5 slopes of the Gaussian, as in LEADR. On a surface that the map displaces, facets
+//! weigh by what the eye sees of them: `leadr.rs`.
 
 use fearless_simd::{Level, dispatch};
 use glam::{DVec2, DVec3, Vec3};
 
-use super::{Decoded, Representation, Row, Sample, no_parameters};
+use super::leadr::SlopeGrid;
+use super::{Decoded, Representation, Row, Sample};
 use crate::brdf::Brdf;
 use crate::shader::Shader;
 use crate::surface::{SurfaceRow, normal_of_slope, slope_of_normal};
 use crate::units::SlopeVariance;
 
 /// Moments of the slope.
-#[derive(Clone, Copy, Debug)]
-pub struct Slopes;
+#[derive(Clone, Debug)]
+pub struct Slopes {
+    /// Slopes over which diffuse facets of a displaced surface are averaged.
+    grid: SlopeGrid,
+}
+
+impl Slopes {
+    /// Diffuse facets of displaced surfaces are averaged over `n` × `n` slopes, 2 to 128.
+    ///
+    /// # Panics
+    /// For another `n`.
+    #[must_use]
+    pub fn new(n: usize) -> Self {
+        assert!((2..=128).contains(&n), "a grid has 2 to 128 slopes on a side");
+        Self { grid: SlopeGrid::new(n) }
+    }
+}
+
+impl Default for Slopes {
+    /// The paper's 5 × 5.
+    fn default() -> Self {
+        Self::new(5)
+    }
+}
 
 pub(super) const ROW: Row = Row {
     name: "slopes",
-    parameters: "",
-    summary: "one anisotropic Gaussian of slopes, with the mean height",
+    parameters: "[:N]",
+    summary: "one anisotropic Gaussian of slopes, with the mean height; N × N of them for displaced diffuse facets (5)",
     paper: "Olano and Baker 2010 (LEAN); Dupuy et al. 2013 (LEADR)",
-    parse: |words| no_parameters(words, Slopes),
-    samples: &["slopes"],
+    parse: |words| match words {
+        [] => Ok(Box::new(Slopes::default())),
+        [n] => match n.parse() {
+            Ok(n @ 2..=128) => Ok(Box::new(Slopes::new(n))),
+            _ => Err(format!("`{n}` is no number of slopes from 2 to 128")),
+        },
+        _ => Err("takes one number at most".to_owned()),
+    },
+    samples: &["slopes", "slopes:9"],
 };
 
 /// What is stored: means of height, slope and products of slopes.
@@ -76,14 +107,19 @@ pub(super) fn stretched<'a>(
     base: SlopeVariance,
     covariance: [f64; 3],
 ) -> impl Fn(DVec2) -> f64 + 'a {
+    move |d| {
+        let (u, per_area) = stretch(base, covariance, d);
+        brdf.evaluate(u) * u * u * u * per_area
+    }
+}
+
+/// Where a slope `d` from the mean lies on the profile of a lobe of width `base`, stretched by a covariance that already holds that width:
+/// the cosine there, and how many times as many slopes are there, per unit of slope area.
+pub(super) fn stretch(base: SlopeVariance, covariance: [f64; 3], d: DVec2) -> (f64, f64) {
     let [xx, yy, xy] = covariance;
     let determinant = (xx * yy - xy * xy).max(f64::MIN_POSITIVE);
-    let (base, area) = (base.get(), base.get() / determinant.sqrt());
-    move |d| {
-        let mahalanobis = (yy * d.x * d.x - 2.0 * xy * d.x * d.y + xx * d.y * d.y) / determinant;
-        let u2 = 1.0 / (1.0 + base * mahalanobis);
-        brdf.evaluate(u2.sqrt()) * u2 * u2.sqrt() * area
-    }
+    let mahalanobis = (yy * d.x * d.x - 2.0 * xy * d.x * d.y + xx * d.y * d.y) / determinant;
+    (1.0 / (1.0 + base.get() * mahalanobis).sqrt(), base.get() / determinant.sqrt())
 }
 
 /// Positions (in deviations) and weights of 5-point Gauss-Hermite quadrature: exact to degree 9.
@@ -114,10 +150,14 @@ fn slope_samples(g: &SlopeGaussian) -> Vec<(DVec3, f64)> {
 #[inline(always)]
 fn moments_of_row(row: &SurfaceRow, first: &mut [[f32; 4]], second: &mut [[f32; 4]]) {
     let normals = row.x.iter().zip(&row.y).zip(&row.z).zip(&row.height);
-    for ((((x, y), z), height), (first, second)) in normals.zip(first.iter_mut().zip(second)) {
+    for ((((x, y), z), height), (first, second)) in normals.zip(first.iter_mut().zip(&mut *second)) {
         let s = slope_of_normal(Vec3::new(*x, *y, *z));
         *first = [*height, s.x, s.y, 1.0];
         *second = [s.x * s.x, s.y * s.y, s.x * s.y, 1.0];
+    }
+    // What slopes stray within a texel, where the surface knows.
+    for (second, spread) in second.iter_mut().zip(&row.spread) {
+        second.iter_mut().zip(spread).for_each(|(s, within)| *s += within);
     }
 }
 
@@ -126,7 +166,10 @@ impl Representation for Slopes {
     type Lobes = SlopeGaussian;
 
     fn spelling(&self) -> String {
-        ROW.name.to_owned()
+        match self.grid.len() {
+            5 => ROW.name.to_owned(),
+            n => format!("{}:{n}", ROW.name),
+        }
     }
 
     fn layers(&self) -> usize {
@@ -139,10 +182,11 @@ impl Representation for Slopes {
 
     fn accumulate(&self, sums: &mut SlopeMoments, sample: &Sample, weight: f32) {
         let s = slope_of_normal(sample.normal);
+        let [xx, yy, xy] = sample.spread;
         let one = SlopeMoments {
             height: sample.height,
             mean: s.to_array(),
-            second: [s.x * s.x, s.y * s.y, s.x * s.y],
+            second: [s.x * s.x + xx, s.y * s.y + yy, s.x * s.y + xy],
         };
         self.blend(sums, &one, weight);
     }
@@ -196,7 +240,15 @@ impl Representation for Slopes {
             include_str!("slopes.wgsl"),
             include_str!("stretched.wgsl"),
             include_str!("whole.wgsl"),
+            include_str!("leadr.wgsl"),
         ])
+        .constant("GRID", self.grid.len() as u32)
+        .constant("GRID_STEP", SlopeGrid::step(self.grid.len()) as f32)
+        .displaces()
+    }
+
+    fn displaced<'a>(&'a self, lobes: &'a SlopeGaussian) -> Option<(&'a SlopeGaussian, &'a SlopeGrid)> {
+        Some((lobes, &self.grid))
     }
 
     fn effective<'a>(&'a self, lobes: &SlopeGaussian, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
@@ -230,7 +282,8 @@ mod tests {
         let alpha = 0.3;
         let brdf = Beckmann::new(Alpha::new(alpha).unwrap());
         let g = SlopeGaussian { height: 0.0, mean: DVec2::new(0.2, -0.1), covariance: [0.05, 0.02, 0.01] };
-        let effective = Slopes.effective(&g, &brdf);
+        let slopes = Slopes::default();
+        let effective = slopes.effective(&g, &brdf);
         let w = DVec3::new(0.1, 0.3, 0.9).normalize();
         let d = DVec2::new(-w.x, -w.y) / w.z - g.mean;
         let base = alpha * alpha / 2.0;

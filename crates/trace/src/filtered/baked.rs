@@ -98,6 +98,7 @@ impl Baked {
             finish: &finish,
             prepared: shading.prepared,
             at_means: lookups.at_means,
+            relief: None,
         };
         shading.method.reflect(&texel, &material.reflection, lights)
     }

@@ -1,0 +1,145 @@
+// LEADR: what a displaced surface sends to the eye, when its slopes are a Gaussian. Twin of leadr.rs.
+//
+// Diffuse facets are averaged over GRID × GRID slopes, GRID_STEP deviations apart.
+
+// Weight of the artificial normal that keeps silhouettes defined.
+const ARTIFICIAL_WEIGHT: f32 = 1e-5;
+
+// How far beyond the edge-on the artificial normal is turned towards the eye.
+const ARTIFICIAL_TURN: f32 = 1.01;
+
+// Least that the eye sees of the artificial normal.
+const LEAST_VISIBLE: f32 = 1e-6;
+
+// The distribution after a linear map of slopes.
+fn stretched_by(g: Decoded, by: mat2x2<f32>) -> Decoded {
+    let c = g.covariance;
+    let moved = by * mat2x2<f32>(c.x, c.z, c.z, c.y) * transpose(by);
+    return Decoded(by * g.mean, vec3<f32>(moved[0].x, moved[1].y, moved[0].y));
+}
+
+// Projected area of the mean normal towards a direction.
+fn projected_area(g: Decoded, w: vec3<f32>) -> f32 {
+    return w.z - dot(g.mean, w.xy);
+}
+
+// Deviation of the projected area of single facets.
+fn projected_deviation(g: Decoded, w: vec3<f32>) -> f32 {
+    let c = g.covariance;
+    return sqrt(max(c.x * w.x * w.x + c.y * w.y * w.y + 2.0 * c.z * w.x * w.y, 0.0));
+}
+
+// Smith's Lambda, exactly, where `area` is above zero.
+fn lambda(g: Decoded, w: vec3<f32>, area: f32) -> f32 {
+    return max(brdf_visible_area(area, projected_deviation(g, w)) / area - 1.0, 0.0);
+}
+
+// The same in Walter et al.'s rational form, with the paper's clamps.
+fn lambda_rational(g: Decoded, w: vec3<f32>) -> f32 {
+    let nu = clamp(projected_area(g, w) / (1.41421356 * projected_deviation(g, w)), 0.001, 1.599);
+    return (1.0 - 1.259 * nu + 0.396 * nu * nu) / (3.535 * nu + 2.181 * nu * nu);
+}
+
+// D(n): area of facets per solid angle of their normals, the lobe's own width in the covariance already.
+fn facets(g: Decoded, base: f32, n: vec3<f32>) -> f32 {
+    if n.z <= 0.0 {
+        return 0.0;
+    }
+    let s = stretch(base, g.covariance, -n.xy / n.z - g.mean);
+    let u2 = s.x * s.x;
+    let z2 = n.z * n.z;
+    return brdf_evaluate(base, s.x) * u2 * u2 * s.y / (z2 * z2);
+}
+
+// A normal that the eye sees where it sees no other, and how much of it.
+fn artificial_normal(g: Decoded, wo: vec3<f32>) -> vec4<f32> {
+    let mean = normalize(vec3<f32>(-g.mean, 1.0));
+    let v = mean - wo * (ARTIFICIAL_TURN * dot(mean, wo));
+    let square = dot(v, v);
+    let n = select(wo, v * inverseSqrt(max(square, 1e-30)), square > 1e-30);
+    return vec4<f32>(n, max(dot(n, wo), LEAST_VISIBLE));
+}
+
+// What shadows take: `a(wo) Lambda(wi)`; below zero where all is in shadow.
+fn shadow(reflection: Reflection, g: Decoded, way: Way) -> f32 {
+    if reflection.model != SHADOWED {
+        return 0.0;
+    }
+    let area = projected_area(g, way.wi);
+    if area <= 0.0 {
+        return -1.0;
+    }
+    return max(projected_area(g, way.wo), 0.0) * lambda(g, way.wi, area);
+}
+
+// Light from specular facets. `spread` holds the lobe's own width already.
+fn displaced_specular(reflection: Reflection, spread: Decoded, gloss: f32, way: Way) -> f32 {
+    let lit = 0.25 * facets(spread, reflection.base, way.wh);
+    if reflection.at_means == 1u {
+        var hidden = 1.0 + lambda_rational(spread, way.wo);
+        if reflection.model == SHADOWED {
+            hidden += lambda_rational(spread, way.wi);
+        }
+        return lit / (projected_area(spread, way.wo) * hidden);
+    }
+    let shadow = shadow(reflection, spread, way);
+    if shadow < 0.0 {
+        return 0.0;
+    }
+    let artificial = artificial_normal(spread, way.wo);
+    let seen = ARTIFICIAL_WEIGHT * artificial.w;
+    let lobe = brdf_evaluate(brdf_widen(reflection.base, gloss), dot(artificial.xyz, way.wh));
+    let facet = lobe * factor(reflection, artificial.xyz, way, gloss);
+    let area = brdf_visible_area(projected_area(spread, way.wo), projected_deviation(spread, way.wo));
+    return (lit + seen * facet) / (area + seen + shadow);
+}
+
+// Light from diffuse facets, times pi over their albedo.
+fn displaced_diffuse(reflection: Reflection, g: Decoded, way: Way) -> f32 {
+    let shadow = shadow(reflection, g, way);
+    if shadow < 0.0 {
+        return 0.0;
+    }
+    let deviation = sqrt(g.covariance.x);
+    let shear = select(0.0, g.covariance.z / deviation, deviation > 0.0);
+    let rest = sqrt(max(g.covariance.y - shear * shear, 0.0));
+    let middle = 0.5 * f32(GRID - 1u);
+    var lit = 0.0;
+    var seen = 0.0;
+    var total = 0.0;
+    for (var i = 0u; i < GRID; i++) {
+        let p = GRID_STEP * (f32(i) - middle);
+        for (var j = 0u; j < GRID; j++) {
+            let q = GRID_STEP * (f32(j) - middle);
+            let weight = exp(-0.5 * (p * p + q * q));
+            // n / n.z
+            let n = vec3<f32>(-g.mean - vec2<f32>(deviation * p, shear * p + rest * q), 1.0);
+            let visible = weight * max(dot(n, way.wo), 0.0);
+            total += weight;
+            seen += visible;
+            lit += visible * max(dot(n, way.wi), 0.0) * inverseSqrt(dot(n, n));
+        }
+    }
+    let artificial = artificial_normal(g, way.wo);
+    let visible = ARTIFICIAL_WEIGHT * artificial.w * total;
+    return (lit + visible * max(dot(artificial.xyz, way.wi), 0.0)) / (seen + visible + shadow * total);
+}
+
+// Light that a filtered texel of a displaced surface sends along the way, per unit of irradiance; `by` is how slopes of the map lie on it.
+fn reflect_displaced(
+    channels: ptr<function, Channels>,
+    decoded: ptr<function, Decoded>,
+    plain: Finish,
+    reflection: Reflection,
+    way: Way,
+    by: mat2x2<f32>,
+) -> vec3<f32> {
+    let g = stretched_by(*decoded, by);
+    var specular = 0.0;
+    if SPECULAR {
+        let width = lobe_width(reflection, plain.gloss);
+        let spread = Decoded(g.mean, g.covariance + vec3<f32>(width, width, 0.0));
+        specular = displaced_specular(reflection, spread, plain.gloss, way);
+    }
+    return together(reflection, plain, way, specular, displaced_diffuse(reflection, g, way));
+}

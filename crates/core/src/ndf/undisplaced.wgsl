@@ -1,0 +1,12 @@
+// For methods that know nothing of displacement: a displaced surface is shaded as one that is not.
+
+fn reflect_displaced(
+    channels: ptr<function, Channels>,
+    decoded: ptr<function, Decoded>,
+    plain: Finish,
+    reflection: Reflection,
+    way: Way,
+    by: mat2x2<f32>,
+) -> vec3<f32> {
+    return reflect_texel(channels, decoded, plain, reflection, way);
+}
