@@ -42,5 +42,5 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let by = input[first + 6u];
     let displaced = way_between(way.wi, wo);
     let relief = reflect_displaced(&channels, &decoded, plain, reflection, displaced, mat2x2<f32>(by.xy, by.zw));
-    output[3u * i + 2u] = vec4<f32>(relief, brdf_visible_area(wo.z, b.w));
+    output[3u * i + 2u] = vec4<f32>(relief, brdf_visible_area(wo.z, 0.3 + b.w));
 }

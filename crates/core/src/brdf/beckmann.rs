@@ -69,6 +69,11 @@ impl Brdf for Beckmann {
         Some(SlopeVariance::clamped(self.alpha_squared / 2.0))
     }
 
+    /// The Gaussian that it is.
+    fn slope_profile(&self, square: f64) -> f64 {
+        (-0.5 * square).exp() / (2.0 * PI)
+    }
+
     fn widen(&self, by: SlopeVariance) -> Box<dyn Brdf> {
         Box::new(self.widened(by))
     }

@@ -32,3 +32,8 @@ fn brdf_masking(u: f32, width: f32) -> f32 {
 fn brdf_visible_area(mean: f32, deviation: f32) -> f32 {
     return mean_of_positive_part(mean, deviation * deviation);
 }
+
+// Density of facets over slopes, at a slope of this squared length in units of the lobe's deviation: D u⁴ times its variance.
+fn brdf_slope_profile(base: f32, square: f32) -> f32 {
+    return exp(-0.5 * square) / (2.0 * PI);
+}

@@ -19,6 +19,11 @@ fn brdf_masking(u: f32, width: f32) -> f32 {
     return 1.0;
 }
 
+// Diffuse facets are not without relief: Beckmann's.
 fn brdf_visible_area(mean: f32, deviation: f32) -> f32 {
-    return max(mean, 0.0);
+    return mean_of_positive_part(mean, deviation * deviation);
+}
+
+fn brdf_slope_profile(base: f32, square: f32) -> f32 {
+    return 0.0;
 }

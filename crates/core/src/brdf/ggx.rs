@@ -68,6 +68,11 @@ impl Brdf for Ggx {
         2.0 / (1.0 + (1.0 + 2.0 * width.get() * tan_squared).sqrt())
     }
 
+    /// Student's t of two degrees, on two axes.
+    fn slope_profile(&self, square: f64) -> f64 {
+        (2.0 * PI * (1.0 + 0.5 * square).powi(2)).recip()
+    }
+
     /// The same equation read as an area, which holds for negative means too: slopes seen along a plane are Student's t of two degrees.
     fn visible_area(&self, mean: f64, deviation: f64) -> f64 {
         let spread = 2.0 * deviation * deviation;

@@ -40,3 +40,9 @@ fn brdf_visible_area(mean: f32, deviation: f32) -> f32 {
     }
     return 0.5 * (mean + root);
 }
+
+// Density of facets over slopes, at a slope of this squared length in units of the lobe's deviation: D u⁴ times its variance.
+fn brdf_slope_profile(base: f32, square: f32) -> f32 {
+    let root = 1.0 + 0.5 * square;
+    return 1.0 / (2.0 * PI * root * root);
+}

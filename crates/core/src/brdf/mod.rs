@@ -61,6 +61,14 @@ pub trait Brdf: Send + Sync + Debug {
         beckmann::masking(u, width)
     }
 
+    /// Density of facets over slopes, in units of the lobe's own deviations: D(u) u⁴ times its variance, at a slope of this squared
+    /// length. Not through u where a lobe is a function of slopes: near 1, u has few of their digits.
+    fn slope_profile(&self, square: f64) -> f64 {
+        let variance = self.slope_variance().unwrap_or(SlopeVariance::ZERO).get();
+        let u2 = 1.0 / (1.0 + variance * square);
+        self.evaluate(u2.sqrt()) * u2 * u2 * variance
+    }
+
     /// Area, projected along a direction, of the facets that face it: the mean of `max(X, 0)` for X of this mean and deviation, X being
     /// distributed as slopes are for lobes of this kind. Beckmann's Gaussian, where a lobe has none of its own. Per unit of area that the
     /// facets cover, and masking apart: [`Self::masking`] is the mean over this.
@@ -75,7 +83,8 @@ pub trait Brdf: Send + Sync + Debug {
         zonal_by_quadrature(self, order)
     }
 
-    /// Text of the twin in WGSL: `SPECULAR` and the functions `brdf_widen`, `brdf_evaluate`, `brdf_variance`, `brdf_masking`.
+    /// Text of the twin in WGSL: `SPECULAR` and the functions `brdf_widen`, `brdf_evaluate`, `brdf_variance`, `brdf_masking`,
+    /// `brdf_slope_profile`, `brdf_visible_area`.
     fn shader(&self) -> &'static str;
 
     /// The one number, `base`, that the twin's functions take for this lobe.

@@ -13,7 +13,7 @@
 
 use glam::{DMat2, DVec2, DVec3};
 
-use super::slopes::{SlopeGaussian, stretch};
+use super::slopes::{SlopeGaussian, mahalanobis, root_of_determinant};
 use super::{FilteredTexel, Lit};
 use crate::brdf::Brdf;
 use crate::reflection::{Model, Reflection, Way};
@@ -74,10 +74,11 @@ impl SlopeGaussian {
     /// lobe's own width in the covariance already.
     #[must_use]
     pub fn facets(&self, lobe: &dyn Brdf, n: DVec3) -> f64 {
-        let Some(base) = lobe.slope_variance().filter(|_| n.z > 0.0) else { return 0.0 };
-        let (u, per_area) = stretch(base, self.covariance, -n.truncate() / n.z - self.mean);
-        let u2 = u * u;
-        lobe.evaluate(u) * u2 * u2 * per_area / n.z.powi(4)
+        if n.z <= 0.0 {
+            return 0.0;
+        }
+        let square = mahalanobis(self.covariance, -n.truncate() / n.z - self.mean);
+        lobe.slope_profile(square) / root_of_determinant(self.covariance) / n.z.powi(4)
     }
 
     /// A normal that the eye sees where it sees no other (section 3.7), and how much of it.

@@ -45,10 +45,9 @@ fn facets(g: Decoded, base: f32, n: vec3<f32>) -> f32 {
     if n.z <= 0.0 {
         return 0.0;
     }
-    let s = stretch(base, g.covariance, -n.xy / n.z - g.mean);
-    let u2 = s.x * s.x;
+    let square = mahalanobis(g.covariance, -n.xy / n.z - g.mean);
     let z2 = n.z * n.z;
-    return brdf_evaluate(base, s.x) * u2 * u2 * s.y / (z2 * z2);
+    return brdf_slope_profile(base, square) * inverseSqrt(determinant_of(g.covariance)) / (z2 * z2);
 }
 
 // A normal that the eye sees where it sees no other, and how much of it.

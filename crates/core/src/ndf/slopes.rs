@@ -107,19 +107,24 @@ pub(super) fn stretched<'a>(
     base: SlopeVariance,
     covariance: [f64; 3],
 ) -> impl Fn(DVec2) -> f64 + 'a {
+    let area = root_of_determinant(covariance).recip();
     move |d| {
-        let (u, per_area) = stretch(base, covariance, d);
-        brdf.evaluate(u) * u * u * u * per_area
+        let square = mahalanobis(covariance, d);
+        // Per map area: the profile counts facet area, which is 1/u as much.
+        brdf.slope_profile(square) * (1.0 + base.get() * square).sqrt() * area
     }
 }
 
-/// Where a slope `d` from the mean lies on the profile of a lobe of width `base`, stretched by a covariance that already holds that width:
-/// the cosine there, and how many times as many slopes are there, per unit of slope area.
-pub(super) fn stretch(base: SlopeVariance, covariance: [f64; 3], d: DVec2) -> (f64, f64) {
+/// Root of the determinant of a covariance (xx, yy, xy): the area of its ellipse over pi.
+pub(super) fn root_of_determinant([xx, yy, xy]: [f64; 3]) -> f64 {
+    (xx * yy - xy * xy).max(f64::MIN_POSITIVE).sqrt()
+}
+
+/// Squared length of a slope in units of its deviations.
+pub(super) fn mahalanobis(covariance: [f64; 3], d: DVec2) -> f64 {
     let [xx, yy, xy] = covariance;
-    let determinant = (xx * yy - xy * xy).max(f64::MIN_POSITIVE);
-    let mahalanobis = (yy * d.x * d.x - 2.0 * xy * d.x * d.y + xx * d.y * d.y) / determinant;
-    (1.0 / (1.0 + base.get() * mahalanobis).sqrt(), base.get() / determinant.sqrt())
+    let root = root_of_determinant(covariance);
+    (yy * d.x * d.x - 2.0 * xy * d.x * d.y + xx * d.y * d.y) / root / root
 }
 
 /// Positions (in deviations) and weights of 5-point Gauss-Hermite quadrature: exact to degree 9.

@@ -2,14 +2,18 @@
 
 // Density of slopes at `d` from the mean, for a lobe whose own width is already in the `covariance` (xx, yy, xy).
 fn stretched(base: f32, covariance: vec3<f32>, d: vec2<f32>) -> f32 {
-    let s = stretch(base, covariance, d);
-    return brdf_evaluate(base, s.x) * s.x * s.x * s.x * s.y;
+    let square = mahalanobis(covariance, d);
+    // Per map area: the profile counts facet area, which is 1/u as much.
+    return brdf_slope_profile(base, square) * sqrt(1.0 + brdf_variance(base) * square) * inverseSqrt(determinant_of(covariance));
 }
 
-// Where a slope `d` from the mean lies on the stretched profile: the cosine there, and how many times as many slopes are there.
-fn stretch(base: f32, covariance: vec3<f32>, d: vec2<f32>) -> vec2<f32> {
-    let determinant = max(covariance.x * covariance.y - covariance.z * covariance.z, 1e-30);
-    let variance = brdf_variance(base);
+// The determinant of a covariance.
+fn determinant_of(covariance: vec3<f32>) -> f32 {
+    return max(covariance.x * covariance.y - covariance.z * covariance.z, 1e-30);
+}
+
+// Squared length of a slope in units of its deviations.
+fn mahalanobis(covariance: vec3<f32>, d: vec2<f32>) -> f32 {
     let m = covariance.y * d.x * d.x - 2.0 * covariance.z * d.x * d.y + covariance.x * d.y * d.y;
-    return vec2<f32>(inverseSqrt(1.0 + variance * max(m / determinant, 0.0)), variance * inverseSqrt(determinant));
+    return max(m / determinant_of(covariance), 0.0);
 }
