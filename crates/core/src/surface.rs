@@ -5,6 +5,8 @@
 //! is `(-slope.x, -slope.y, 1)` normalised (`docs/notation.md`). Heights are in units of the texture's
 //! width on both axes, so slopes have no unit and do not depend on the resolution.
 
+use std::sync::Arc;
+
 use glam::{Vec2, Vec3};
 
 use crate::grid::{Grid, Size};
@@ -137,6 +139,11 @@ pub trait Surface: Send + Sync {
         false
     }
 
+    /// The same with the slopes that the surface between its heights has, where it can tell them.
+    fn with_exact_slopes(&self) -> Option<Arc<dyn Surface>> {
+        None
+    }
+
     /// The map of it that a method (by its spelling) has baked before, if it comes with one.
     fn baked(&self, _method: &str) -> Option<&Pyramid> {
         None
@@ -231,6 +238,10 @@ impl Surface for HeightField {
 
     fn has_height(&self) -> bool {
         true
+    }
+
+    fn with_exact_slopes(&self) -> Option<Arc<dyn Surface>> {
+        Some(Arc::new(Self { filter: SlopeFilter::Bilinear, ..self.clone() }))
     }
 
     fn read_row(&self, y: usize, row: &mut SurfaceRow) {

@@ -43,6 +43,7 @@ fn plate(surface: Arc<dyn Surface>, lobe: &str, model: Model, distance: f64) -> 
                 gloss: SlopeVariance::ZERO,
             },
             finish_map: None,
+            relief: None,
             reflection: Reflection { lobe: brdf::parse(lobe).unwrap(), model },
         }],
         lights: vec![Light::Directional {

@@ -22,6 +22,12 @@ impl Beckmann {
         Self { alpha_squared: alpha.get() * alpha.get() }
     }
 
+    /// A lobe of slopes of this variance.
+    #[must_use]
+    pub fn of_width(width: SlopeVariance) -> Self {
+        Self { alpha_squared: 2.0 * width.get() }
+    }
+
     fn widened(&self, by: SlopeVariance) -> Self {
         Self { alpha_squared: self.alpha_squared + 2.0 * by.get() }
     }
@@ -72,6 +78,10 @@ impl Brdf for Beckmann {
     /// The Gaussian that it is.
     fn slope_profile(&self, square: f64) -> f64 {
         (-0.5 * square).exp() / (2.0 * PI)
+    }
+
+    fn microfacets(&self) -> Option<Self> {
+        None
     }
 
     fn widen(&self, by: SlopeVariance) -> Box<dyn Brdf> {

@@ -81,6 +81,10 @@ impl Brdf for Ggx {
         if mean < 0.0 { spread / (root - mean) / 2.0 } else { (mean + root) / 2.0 }
     }
 
+    fn microfacets(&self) -> Option<super::Beckmann> {
+        None
+    }
+
     fn widen(&self, by: SlopeVariance) -> Box<dyn Brdf> {
         Box::new(self.widened(by))
     }

@@ -61,6 +61,11 @@ pub trait Brdf: Send + Sync + Debug {
         beckmann::masking(u, width)
     }
 
+    /// The microfacets of a lobe that is none: Beckmann's, as wide as it; `None` for lobes of microfacets, and for Lambert.
+    fn microfacets(&self) -> Option<Beckmann> {
+        self.slope_variance().map(Beckmann::of_width)
+    }
+
     /// Density of facets over slopes, in units of the lobe's own deviations: D(u) u⁴ times its variance, at a slope of this squared
     /// length. Not through u where a lobe is a function of slopes: near 1, u has few of their digits.
     fn slope_profile(&self, square: f64) -> f64 {

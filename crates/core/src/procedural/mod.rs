@@ -8,11 +8,13 @@ mod carved_disk;
 mod dunes;
 mod foil;
 mod noise;
+mod noise_sphere;
 mod ripples;
 mod v_groove;
 mod weave;
 
 pub use noise::gaussian_noise;
+pub use noise_sphere::{Grain, sphere_noise};
 pub use v_groove::GROOVE_SLOPE;
 
 use crate::grid::{Grid, Size};

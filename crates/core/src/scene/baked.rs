@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::bake::Bake;
 use crate::fit::{Four, LobeKind};
 use crate::grid::{Grid, Size};
-use crate::ndf::Method;
+use crate::ndf::{Decoded, Method};
 use crate::pyramid::{Precision, Pyramid};
 use crate::surface::{Surface, SurfaceRow, Wraps};
 
@@ -63,12 +63,25 @@ impl Surface for BakedSurface {
     }
 
     fn read_row(&self, y: usize, row: &mut SurfaceRow) {
-        row.height.fill(0.0);
         for x in 0..self.size().width {
             let channels = self.pyramid.texel(0, x, y);
-            let mean = self.method.mean_normal(&channels[..4 * self.method.layers()]);
+            let channels = &channels[..4 * self.method.layers()];
+            row.height[x] = match self.method.describe(channels) {
+                Decoded::Slopes { height, .. } => height as f32,
+                _ => 0.0,
+            };
+            let mean = self.method.mean_normal(channels);
             row.set_normal(x, mean.normalize_or(DVec3::Z).as_vec3());
         }
+    }
+
+    fn has_height(&self) -> bool {
+        // Slopes of a normal map come without.
+        let mut row = SurfaceRow::flat(self.size().width);
+        (0..self.size().height).any(|y| {
+            self.read_row(y, &mut row);
+            row.height.iter().any(|h| *h != 0.0)
+        })
     }
 
     fn baked(&self, method: &str) -> Option<&Pyramid> {

@@ -94,6 +94,7 @@ fn cloth(time: f64) -> Mesh {
     let mut mesh = Mesh {
         vertices: places.iter().enumerate().map(vertex).collect(),
         triangles: grid_triangles(CELLS, CELLS),
+        stretches: Vec::new(),
     };
     // Tangents along the threads; `smooth` turns them into the surface.
     for i in 0..side * side {
@@ -120,6 +121,7 @@ pub(super) const ROW: Row = Row {
             surface,
             finish,
             finish_map: None,
+            relief: None,
             reflection: reflection(Model::Han, lobe),
         };
         let under = Mesh::from_patch((64, 32), DVec2::ONE, |s, t| BALL * ball(s, t));

@@ -112,6 +112,7 @@ pub(super) const ROW: Row = Row {
             surface,
             finish,
             finish_map: None,
+            relief: None,
             reflection: reflection(Model::Han, lobe),
         };
         let finish = |diffuse: [f64; 3], specular: f64, gloss: f64| Finish {

@@ -46,6 +46,7 @@ pub(super) const ROW: Row = Row {
                     gloss: SlopeVariance::ZERO,
                 },
                 finish_map: None,
+                relief: None,
                 reflection: reflection(Model::Tan, "torrance-sparrow:0.2"),
             }],
             lights: vec![sun([-1.0, 0.42, -0.35], [3.2, 2.7, 2.1]), sun([0.3, 1.0, 0.3], [0.35, 0.45, 0.65])],

@@ -38,6 +38,7 @@ fn scene(staging: &Staging, camera: Camera) -> Scene {
                 gloss: SlopeVariance::ZERO,
             },
             finish_map: None,
+            relief: None,
             reflection: reflection(Model::Tan, "torrance-sparrow:0.08"),
         }],
         lights: vec![sun([-0.5, 0.6, 0.9], [1.0, 0.97, 0.9]), sun([0.7, 0.1, 0.6], [0.35, 0.4, 0.5])],

@@ -28,6 +28,7 @@ pub(super) const ROW: Row = Row {
                     gloss: SlopeVariance::ZERO,
                 },
                 finish_map: None,
+                relief: None,
                 reflection: reflection(Model::Smith, "ggx:0.12"),
             }],
             lights: vec![sun([-0.4, 0.7, 1.0], [2.6, 2.5, 2.3]), sun([0.9, 0.2, 0.5], [0.7, 0.8, 1.0])],

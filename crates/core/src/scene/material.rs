@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::Relief;
 use crate::grid::Grid;
 use crate::reflection::{Finish, Reflection};
 use crate::surface::Surface;
@@ -73,6 +74,8 @@ pub struct Material {
     pub finish: Finish,
     /// Colours and gloss of each texel, of the surface's size.
     pub finish_map: Option<FinishMap>,
+    /// What of it stands out of its meshes; `None` for a map of normals alone.
+    pub relief: Option<Relief>,
     /// Lobe and model.
     pub reflection: Reflection,
 }

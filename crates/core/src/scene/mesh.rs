@@ -1,6 +1,6 @@
 //! Triangle meshes with tangent frames, and the shapes that built-in scenes are made of.
 
-use glam::{DVec2, DVec3, Vec2, Vec3, Vec4};
+use glam::{DVec2, DVec3, Mat2, Vec2, Vec3, Vec4};
 
 /// A corner of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +23,8 @@ pub struct Mesh {
     pub vertices: Vec<Vertex>,
     /// Three corners each.
     pub triangles: Vec<[u32; 3]>,
+    /// For a mesh with relief, how slopes of the map lie on it at each vertex; else none.
+    pub stretches: Vec<Mat2>,
 }
 
 impl Mesh {
@@ -59,7 +61,7 @@ impl Mesh {
         };
         let corners = (0..=rows).flat_map(|j| (0..=columns).map(move |i| (i, j)));
         let vertices = corners.map(|(i, j)| vertex(i, j)).collect();
-        Self { vertices, triangles: grid_triangles(columns, rows) }
+        Self { vertices, triangles: grid_triangles(columns, rows), stretches: Vec::new() }
     }
 
     /// A tube around a curve; `path(t)` gives its middle and radius for t from 0 to 1, and the map runs around and along.

@@ -13,14 +13,18 @@ mod disk;
 mod foil;
 mod material;
 mod mesh;
+mod noise_sphere;
 mod plane;
+mod relief;
 mod sphere;
+pub mod tessellation;
 mod v_groove;
 
 pub use baked::{BakedMaterial, BakedSurface};
 pub use camera::{Camera, Rays};
 pub use material::{FinishMap, Material};
 pub use mesh::{Mesh, Vertex, area_normals};
+pub use relief::Relief;
 
 use std::sync::Arc;
 
@@ -108,6 +112,9 @@ pub static TABLE: &[Row] = &[
     armour::ROW,
     desert::ROW,
     sphere::ROW,
+    noise_sphere::ROW,
+    noise_sphere::LATITUDINAL,
+    noise_sphere::LONGITUDINAL,
     v_groove::ROW,
     foil::ROW,
     creature::ROW,
@@ -141,15 +148,76 @@ impl Scene {
         self.materials.iter_mut().for_each(|m| m.reflection.model = model);
     }
 
+    /// Lets maps with heights displace what they lie on: by `scale` times what keeps their slopes, so that 1 is the surface that the map was
+    /// made of. Lobes become those of microfacets; facets hide each other from the eye, and, with `shadows`, from lights.
+    ///
+    /// # Errors
+    /// [`NoHeights`] when no map has any.
+    pub fn displace(&mut self, scale: f64, shadows: bool) -> Result<(), NoHeights> {
+        let mut any = false;
+        for (index, material) in self.materials.iter_mut().enumerate() {
+            if !material.surface.has_height() {
+                continue;
+            }
+            any = true;
+            if let Some(exact) = material.surface.with_exact_slopes() {
+                material.surface = exact;
+            }
+            let Size { width, height } = material.surface.size();
+            let on = |o: &&mut Object| o.material == index;
+            let meshes = self.objects.iter().filter(|o| o.material == index).map(|o| &*o.mesh);
+            let depth = scale * relief::natural_depth(meshes, height as f64 / width as f64);
+            let relief = Relief::new(&*material.surface, depth);
+            for object in self.objects.iter_mut().filter(on) {
+                object.mesh = object.mesh.with_relief(&relief).into();
+            }
+            material.relief = Some(relief);
+            material.reflection.model = if shadows { Model::Shadowed } else { Model::Masked };
+            if let Some(lobe) = material.reflection.lobe.microfacets() {
+                material.reflection.lobe = Box::new(lobe);
+            }
+        }
+        if any { Ok(()) } else { Err(NoHeights) }
+    }
+
+    /// The scene as a picture of this size sees it: meshes with relief cut and displaced.
+    #[must_use]
+    pub fn displaced_for(&self, camera: &Camera, size: Size) -> Vec<Object> {
+        let rays = camera.rays(size);
+        let displaced = |object: &Object| {
+            let Some(relief) = &self.materials[object.material].relief else { return object.clone() };
+            let plan = tessellation::plan(&object.mesh, relief, &rays, size);
+            let mesh = tessellation::expand(&object.mesh, relief, &plan, &rays);
+            Object { mesh: mesh.into(), ..object.clone() }
+        };
+        self.objects.iter().map(displaced).collect()
+    }
+
+    /// True where some material has relief.
+    #[must_use]
+    pub fn has_relief(&self) -> bool {
+        self.materials.iter().any(|m| m.relief.is_some())
+    }
+
     /// A sphere that holds the scene, around the middle of its box: centre and radius.
     #[must_use]
     pub fn bounds(&self) -> (DVec3, f64) {
         let places = || self.objects.iter().flat_map(|o| &o.mesh.vertices).map(|v| v.position);
         let low = places().fold(Vec3::INFINITY, Vec3::min).as_dvec3();
         let high = places().fold(Vec3::NEG_INFINITY, Vec3::max).as_dvec3();
-        if low.x > high.x { (DVec3::ZERO, 1.0) } else { ((low + high) / 2.0, (high - low).length() / 2.0) }
+        let reach =
+            self.materials.iter().filter_map(|m| m.relief.as_ref()).map(|r| r.reach).fold(0.0, f64::max);
+        if low.x > high.x {
+            return (DVec3::ZERO, 1.0);
+        }
+        ((low + high) / 2.0, (high - low).length() / 2.0 + reach)
     }
 }
+
+/// A scene without heights cannot be displaced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("none of the scene's maps has heights")]
+pub struct NoHeights;
 
 /// A light far away, from a direction that need not be of unit length.
 fn sun(towards: [f64; 3], irradiance: [f64; 3]) -> Light {

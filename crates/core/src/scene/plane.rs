@@ -25,6 +25,7 @@ fn build(staging: &Staging) -> Scene {
                 gloss: SlopeVariance::ZERO,
             },
             finish_map: None,
+            relief: None,
             reflection: reflection(Model::Smith, "beckmann:0.15"),
         }],
         lights: vec![sun([0.1, 0.45, -1.0], [1.6, 1.5, 1.35])],

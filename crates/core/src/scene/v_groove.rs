@@ -24,6 +24,7 @@ pub(super) const ROW: Row = Row {
                     gloss: SlopeVariance::ZERO,
                 },
                 finish_map: None,
+                relief: None,
                 reflection: reflection(Model::Han, "blinn-phong:60"),
             }],
             lights: vec![sun([3.0 * staging.time - 1.5, 0.2, 1.0], [1.0, 1.0, 1.0])],

@@ -233,6 +233,7 @@ impl Files<'_> {
                 surface,
                 finish,
                 finish_map: None,
+                relief: None,
                 reflection: microfacets(roughness * roughness),
             });
         }
@@ -251,7 +252,7 @@ impl Files<'_> {
         let finish_map =
             Some(FinishMap { diffuse_gloss: diffuse_gloss.into(), specular: Some(specular.into()) });
         // The lobe itself is as sharp as can be; all its width is in the map.
-        Ok(Material { name, surface, finish, finish_map, reflection: microfacets(0.0) })
+        Ok(Material { name, surface, finish, finish_map, relief: None, reflection: microfacets(0.0) })
     }
 }
 

@@ -179,6 +179,7 @@ fn plain() -> Material {
             gloss: SlopeVariance::ZERO,
         },
         finish_map: None,
+        relief: None,
         reflection: microfacets(0.25),
     }
 }
@@ -240,7 +241,11 @@ impl RawMesh {
             tangent: across(self.tangents[i].truncate(), self.normals[i]).extend(self.tangents[i].w.signum()),
             uv: self.uvs[i],
         };
-        Ok(Mesh { vertices: (0..self.positions.len()).map(vertex).collect(), triangles: self.triangles })
+        Ok(Mesh {
+            vertices: (0..self.positions.len()).map(vertex).collect(),
+            triangles: self.triangles,
+            stretches: Vec::new(),
+        })
     }
 }
 
