@@ -8,12 +8,12 @@ use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::Scene;
 use ndfmap_trace::filtered::Lookups;
-use ndfmap_trace::truth::{Effort, Truth};
-use ndfmap_trace::{DRIFT_FRAMES, Geometry, drifted};
+use ndfmap_trace::truth::Effort;
+use ndfmap_trace::{DRIFT_FRAMES, drifted};
 use serde_json::{Map, Value, json};
 
 use crate::Failure;
-use crate::engine::{Drawn, Engine, View};
+use crate::engine::{Drawn, Engine, TrueGeometry, View};
 use crate::progress::Progress;
 use crate::staging::Stage;
 
@@ -119,7 +119,7 @@ fn frame<E: Engine>(
     baked: &[E::Maps<'_>],
 ) -> Result<Frame, Failure> {
     let (size, exposure) = (shot.size, scene.exposure);
-    let set = engine.set(scene)?;
+    let set = engine.set(scene, size)?;
     let view = View { scene, set: &set, camera: scene.camera, size };
     let start = Instant::now();
     let brute = |effort: Effort| {
@@ -131,8 +131,8 @@ fn frame<E: Engine>(
     // A drifting truth is rendered in one go, which only the CPU renderer knows.
     let drifting = shot.truth.filter(|_| shot.sparkle).map(|effort| {
         let progress = Progress::new("truth, drifting");
-        let geometry = Geometry::new(scene);
-        let truth = Truth::new(scene, &geometry);
+        let geometry = TrueGeometry::new(scene);
+        let truth = geometry.truth(scene);
         true_change(&truth.drift(&scene.camera, size, effort.rays, &|f| progress.set(f)), exposure)
     });
     let take = |maps: &E::Maps<'_>| -> Result<(Take, Picture), Failure> {

@@ -30,6 +30,16 @@ pub(crate) struct Stage {
     pub(crate) diffuse: Option<DVec3>,
     pub(crate) specular: Option<DVec3>,
     pub(crate) exposure: Option<f64>,
+    /// Let heights displace meshes.
+    pub(crate) displacement: Option<Displacement>,
+}
+
+/// How heights displace meshes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Displacement {
+    /// Times what keeps their slopes.
+    pub(crate) scale: f64,
+    pub(crate) shadows: bool,
 }
 
 /// A camera as spelled.
@@ -73,6 +83,11 @@ impl Stage {
         }
         if let Some(model) = self.model {
             scene.set_model(model);
+        }
+        if let Some(Displacement { scale, shadows }) = self.displacement {
+            scene.displace(scale, shadows).map_err(|e| {
+                Failure::Usage(format!("--displace {}: {e}; name one with `--map`", self.scene))
+            })?;
         }
         if let Some(camera) = self.camera {
             let degrees = camera.degrees.unwrap_or(scene.camera.degrees);

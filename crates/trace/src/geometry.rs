@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
-use glam::{DMat3, DVec2, DVec3, Vec3A};
-use ndfmap_core::scene::{Rays, Scene, Vertex};
+use glam::{DMat2, DMat3, DVec2, DVec3, Mat2, Vec3A};
+use ndfmap_core::grid::Size;
+use ndfmap_core::scene::{Camera, Mesh, Object, Rays, Scene, Vertex};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::cwbvh::{CwBvh, builder::build_cwbvh};
@@ -13,6 +14,8 @@ use obvhs::ray::{Ray, RayHit};
 pub struct Geometry {
     /// Corners, object, in the order of the scene.
     triangles: Vec<Triangle>,
+    /// How slopes of maps lie at each triangle's corners; none in a scene without relief.
+    stretches: Vec<[Mat2; 3]>,
     /// `None` for a scene without triangles.
     hierarchy: Option<CwBvh>,
     /// A sphere around everything. Boxes are in single floats, so they and the rays are taken from its middle, and rays
@@ -52,14 +55,41 @@ pub struct Place {
     pub material: usize,
     /// Index into the scene's objects.
     pub object: usize,
+    /// On a mesh with relief, how slopes of the map lie in the frame.
+    pub stretch: Option<DMat2>,
 }
 
 impl Geometry {
-    /// Builds the hierarchy.
+    /// Builds the hierarchy. Meshes with relief are taken as they are without.
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
-        let mut triangles = Vec::new();
-        for (object, o) in scene.objects.iter().enumerate() {
+        Self::of(scene, &scene.objects)
+    }
+
+    /// The same with meshes cut and displaced for a picture of this size.
+    #[must_use]
+    pub fn displaced(scene: &Scene, camera: &Camera, size: Size) -> Self {
+        Self::of(scene, &scene.displaced_for(camera, size))
+    }
+
+    /// Only the meshes that have no relief.
+    #[must_use]
+    pub fn without_relief(scene: &Scene) -> Self {
+        let bare = |o: &Object| match scene.materials[o.material].relief {
+            Some(_) => Object { mesh: Mesh::default().into(), ..o.clone() },
+            None => o.clone(),
+        };
+        Self::of(scene, &scene.objects.iter().map(bare).collect::<Vec<_>>())
+    }
+
+    fn of(scene: &Scene, objects: &[Object]) -> Self {
+        let (mut triangles, mut stretches) = (Vec::new(), Vec::new());
+        let relief = scene.has_relief();
+        for (object, o) in objects.iter().enumerate() {
+            if relief {
+                let at = |i: u32| o.mesh.stretches.get(i as usize).copied().unwrap_or(Mat2::NAN);
+                stretches.extend(o.mesh.triangles.iter().map(|t| t.map(at)));
+            }
             let of = |t: &[u32; 3]| Triangle {
                 corners: t.map(|i| o.mesh.vertices[i as usize]),
                 object: object as u32,
@@ -78,7 +108,7 @@ impl Geometry {
         let boxes: Vec<Aabb> = triangles.iter().map(around).collect();
         let build = || build_cwbvh(&boxes, BvhBuildParams::medium_build(), &mut Duration::default());
         let hierarchy = (!boxes.is_empty()).then(build);
-        Self { triangles, hierarchy, middle, radius }
+        Self { triangles, stretches, hierarchy, middle, radius }
     }
 
     /// Number of triangles.
@@ -103,7 +133,8 @@ impl Geometry {
         let mut nearest: Option<Hit> = None;
         hierarchy.ray_traverse(ray, &mut RayHit::none(), |_, i| {
             let triangle = hierarchy.primitive_indices[i];
-            match intersect(&self.triangles[triangle as usize], origin, direction) {
+            let corners = self.triangles[triangle as usize].corners.map(|c| c.position.as_dvec3());
+            match intersect(corners, origin, direction) {
                 Some((distance, barycentric)) => {
                     if nearest.is_none_or(|n| distance < n.distance) {
                         nearest = Some(Hit { triangle, distance, barycentric });
@@ -119,9 +150,10 @@ impl Geometry {
     /// What lies where a ray of this direction hit.
     ///
     /// Seen from behind, a surface shows its back, frame turned about the tangent. Where the normal between corners has turned
-    /// away from an eye that the triangle itself faces, it is bent back until it just does not: else there would be holes.
+    /// away from an eye that the triangle itself faces, it is bent back until it just does not: else there would be holes. Not so
+    /// where `unbent`: facets of relief may be seen where the base mesh is not.
     #[must_use]
-    pub fn place(&self, hit: &Hit, direction: DVec3) -> Place {
+    pub fn place(&self, hit: &Hit, direction: DVec3, unbent: bool) -> Place {
         let Triangle { corners: [a, b, c], object, material } = &self.triangles[hit.triangle as usize];
         let DVec2 { x: s, y: t } = hit.barycentric;
         let r = 1.0 - s - t;
@@ -131,7 +163,13 @@ impl Geometry {
         let face = face * side;
         let normal = mix(|v| v.normal.as_dvec3()).normalize_or(face) * side;
         let facing = -normal.dot(direction);
-        let normal = if facing < LEAST_FACING {
+        let stretch = self.stretches.get(hit.triangle as usize).map(|[p, q, u]| {
+            let stretch = (*p).as_dmat2() * r + (*q).as_dmat2() * s + (*u).as_dmat2() * t;
+            // From behind, what stands out goes in, along the turned frame: only the slope along the tangent changes its sign.
+            DMat2::from_diagonal(DVec2::new(side, 1.0)) * stretch
+        });
+        let stretch = stretch.filter(|stretch| stretch.is_finite());
+        let normal = if facing < LEAST_FACING && !(unbent && stretch.is_some()) {
             (normal - direction * (LEAST_FACING - facing)).normalize()
         } else {
             normal
@@ -147,6 +185,7 @@ impl Geometry {
             uv,
             material: *material as usize,
             object: *object as usize,
+            stretch,
         }
     }
 
@@ -176,8 +215,7 @@ fn face([a, b, c]: &[Vertex; 3]) -> DVec3 {
 
 /// Distance and the weights of the second and third corner (Möller and Trumbore 1997), in f64, where cracks between
 /// triangles are too narrow to be found by chance.
-fn intersect(triangle: &Triangle, origin: DVec3, direction: DVec3) -> Option<(f64, DVec2)> {
-    let [a, b, c] = triangle.corners.map(|c| c.position.as_dvec3());
+pub(crate) fn intersect([a, b, c]: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<(f64, DVec2)> {
     let (p, q) = (b - a, c - a);
     let across = direction.cross(q);
     let determinant = p.dot(across);

@@ -7,23 +7,27 @@
 mod drift;
 pub mod filtered;
 mod geometry;
+mod relief;
 pub mod truth;
 
 pub use drift::{DRIFT_FRAMES, drifted};
 pub use geometry::{Geometry, Hit};
+pub use relief::{Facet, FacetHit, Relief};
 
 use glam::{DMat3, DVec3};
 use ndfmap_core::light::Light;
 use ndfmap_core::reflection::Way;
 
-/// The ways from each light that reaches a place to the eye, in the place's tangent frame, with the light's irradiance.
+/// The ways from each light that reaches a place to the eye, in the place's tangent frame, with the light's irradiance; `between` makes a
+/// way of two directions.
 fn ways<'a>(
     lights: &'a [Light],
     (place, frame): (DVec3, DMat3),
     wo: DVec3,
+    between: fn(DVec3, DVec3) -> Option<Way>,
 ) -> impl Iterator<Item = (Way, DVec3)> + 'a {
     lights.iter().filter_map(move |light| {
         let (towards, irradiance) = light.seen_from(place);
-        Way::new(frame.transpose() * towards, wo).map(|way| (way, irradiance))
+        between(frame.transpose() * towards, wo).map(|way| (way, irradiance))
     })
 }

@@ -13,7 +13,7 @@ use glam::{DMat2, DVec2, Mat2, Vec3};
 use super::Mesh;
 use super::tessellation::split;
 use crate::grid::{Grid, Size};
-use crate::lookup::{Lookup, Tap, Texels};
+use crate::lookup::{Lookup, Neighbour, Tap, Texels};
 use crate::surface::{Surface, SurfaceRow};
 
 /// Heights of a map, and how far they stand out.
@@ -50,6 +50,15 @@ impl Relief {
         let texel = self.depth.abs() / self.heights_size().width as f64;
         self.heights.trilinear(Tap { uv, lod: (width / texel).max(1.0).log2() }, 1.0, &mut sums);
         f64::from(sums[0]) * self.depth
+    }
+
+    /// World height at a place of the map, of the bilinear surface between its heights.
+    #[inline]
+    #[must_use]
+    pub fn finest(&self, uv: DVec2) -> f64 {
+        let around = self.heights.around(0, uv);
+        let height = |n: &Neighbour| n.weight * f64::from(self.heights.texel(0, n.x, n.y)[0]);
+        around.iter().map(height).sum::<f64>() * self.depth
     }
 
     /// Texels of the finest heights.

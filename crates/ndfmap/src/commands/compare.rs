@@ -16,7 +16,7 @@ use super::arguments::{
     BuiltinSize, Precision, SourceArguments, brdf_spelling, brdfs_help, method, method_spelling,
     methods_help, scene_name, size,
 };
-use super::render::{FilterArguments, check_drift};
+use super::render::{DisplaceArguments, FilterArguments, check_drift};
 use super::{print, print_json, say_if_replaced, warn};
 use crate::Failure;
 use crate::engine::Cpu;
@@ -64,6 +64,8 @@ pub(super) struct Compare {
     #[arg(long, requires = "scene")]
     sparkle: bool,
     #[command(flatten)]
+    displace: DisplaceArguments,
+    #[command(flatten)]
     filter: FilterArguments,
     #[command(flatten)]
     source: SourceArguments,
@@ -99,6 +101,7 @@ impl Compare {
                     scene: scene.clone(),
                     map: Some(Arc::clone(&map.surface)),
                     brdf: Some(self.brdf.clone()),
+                    displacement: self.displace.displacement(),
                     ..Stage::default()
                 },
                 times: vec![0.0],

@@ -32,7 +32,7 @@ use crate::engine::Cpu;
 use crate::engine::Gpu;
 use crate::imaging::{Frame, Reel, Shot, shoot};
 use crate::report::pictures::{self, Plan};
-use crate::staging::{CameraArgument, Stage};
+use crate::staging::{CameraArgument, Displacement, Stage};
 
 /// Render a scene through baked maps, and by brute force to compare
 #[derive(Debug, Args)]
@@ -47,7 +47,7 @@ pub(super) struct Render {
     /// The picture to write, by the first method: .png as shown, .exr in linear light; several frames are numbered
     #[arg(short, long, value_name = "FILE", required_unless_present_any = ["compare", "truth_output", "json"])]
     output: Option<PathBuf>,
-    #[arg(short, long, value_delimiter = ',', value_parser = method_spelling, help = "Methods, separated by commas [default: vmf:4, or a baked map's own]")]
+    #[arg(short, long, value_delimiter = ',', value_parser = method_spelling, help = "Methods, separated by commas [default: vmf:4; displaced, slopes; or a baked map's own]")]
     method: Vec<String>,
     /// Render the truth too, with at most this many rays a pixel, and measure against it
     #[arg(long, value_name = "RAYS", num_args = 0..=1, default_missing_value = "256",
@@ -86,6 +86,8 @@ pub(super) struct Render {
     /// What goes with the lobe: the factor of Tan et al., of Han et al. or of Smith (tan, han, smith)
     #[arg(long, value_parser = model)]
     model: Option<Model>,
+    #[command(flatten)]
+    displace: DisplaceArguments,
     /// Diffuse albedo R,G,B of the first material, in place of its own; its textures go
     #[arg(long, value_name = "R,G,B", value_parser = colour)]
     diffuse: Option<DVec3>,
@@ -118,6 +120,32 @@ pub(super) struct Render {
     map_size: Option<Size>,
     #[command(flatten)]
     source: SourceArguments,
+}
+
+/// What is displaced.
+#[derive(Debug, Args)]
+pub(super) struct DisplaceArguments {
+    /// Height maps displace what they lie on, by SCALE times what keeps their slopes; lobes become microfacets, and the truth is that of the
+    /// displaced surface
+    #[arg(long, value_name = "SCALE", num_args = 0..=1, default_missing_value = "1", value_parser = scale,
+        allow_negative_numbers = true, requires = "scene", conflicts_with = "model")]
+    displace: Option<f64>,
+    /// Facets of displaced surfaces shade each other
+    #[arg(long, requires = "displace")]
+    shadows: bool,
+}
+
+impl DisplaceArguments {
+    pub(super) fn displacement(&self) -> Option<Displacement> {
+        self.displace.map(|scale| Displacement { scale, shadows: self.shadows })
+    }
+}
+
+fn scale(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(v) if v != 0.0 && v.abs() <= 1000.0 => Ok(v),
+        _ => Err(format!("`{text}` is no number from -1000 to 1000, and not 0")),
+    }
 }
 
 /// How maps are looked up.
@@ -299,7 +327,8 @@ impl Render {
             return Err(Failure::Usage(format!("{}: contact sheets are written as .png", sheet.display())));
         }
         let baked = self.read_baked()?;
-        let own = baked.as_ref().map_or_else(|| "vmf:4".to_owned(), |map| map.method.spelling());
+        let usual = if self.displace.displace.is_some() { "slopes" } else { "vmf:4" };
+        let own = baked.as_ref().map_or_else(|| usual.to_owned(), |map| map.method.spelling());
         let asked = if self.method.is_empty() { std::slice::from_ref(&own) } else { &self.method[..] };
         let mut methods: Vec<Box<dyn Method>> = Vec::new();
         for spelling in asked {
@@ -426,6 +455,7 @@ impl Render {
             diffuse: self.diffuse,
             specular: self.specular,
             exposure: self.exposure,
+            displacement: self.displace.displacement(),
         })
     }
 

@@ -2,15 +2,16 @@
 
 use std::time::Instant;
 
+use ndfmap_core::grid::Size;
 use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{Material, Scene};
 use ndfmap_trace::Geometry;
 use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
-use ndfmap_trace::truth::{Effort, TruePicture, Truth};
+use ndfmap_trace::truth::{Effort, TruePicture};
 use serde_json::{Value, json};
 
-use super::{Drawn, Engine, View};
+use super::{Drawn, Engine, TrueGeometry, View};
 use crate::Failure;
 
 /// The processor.
@@ -34,8 +35,8 @@ impl Engine for Cpu {
         Ok(BakedMaps::new(materials, method, precision, progress))
     }
 
-    fn set(&self, scene: &Scene) -> Result<Geometry, Failure> {
-        Ok(Geometry::new(scene))
+    fn set(&self, scene: &Scene, size: Size) -> Result<Geometry, Failure> {
+        Ok(Geometry::displaced(scene, &scene.camera, size))
     }
 
     fn truth(
@@ -44,7 +45,8 @@ impl Engine for Cpu {
         effort: &Effort,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<TruePicture, Failure> {
-        Ok(Truth::new(view.scene, view.set).render(&view.camera, view.size, effort, progress))
+        let true_geometry = TrueGeometry::new(view.scene);
+        Ok(true_geometry.truth(view.scene).render(&view.camera, view.size, effort, progress))
     }
 
     fn draw(

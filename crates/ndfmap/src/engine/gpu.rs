@@ -1,5 +1,6 @@
 //! A GPU renders: `ndfmap-gpu`.
 
+use ndfmap_core::grid::Size;
 use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{Material, Scene};
@@ -11,7 +12,7 @@ use ndfmap_trace::filtered;
 use ndfmap_trace::truth::{self, TruePicture};
 use serde_json::{Value, json};
 
-use super::{Drawn, Engine, View};
+use super::{Drawn, Engine, TrueGeometry, View};
 use crate::Failure;
 
 /// A GPU, and how it draws.
@@ -72,8 +73,8 @@ impl Engine for Gpu<'_> {
         Ok(Maps::new(self.device, materials, method, precision, progress)?)
     }
 
-    fn set(&self, scene: &Scene) -> Result<Geometry, Failure> {
-        Ok(Geometry::new(self.device, scene)?)
+    fn set(&self, scene: &Scene, size: Size) -> Result<Geometry, Failure> {
+        Ok(Geometry::displaced(self.device, scene, &scene.camera, size)?)
     }
 
     fn truth(
@@ -82,6 +83,11 @@ impl Engine for Gpu<'_> {
         effort: &truth::Effort,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<TruePicture, Failure> {
+        if view.scene.has_relief() {
+            // Facets of relief are rays' business.
+            let geometry = TrueGeometry::new(view.scene);
+            return Ok(geometry.truth(view.scene).render(&view.camera, view.size, effort, progress));
+        }
         let canvas = Canvas::new(self.device, view.size, Outlines::Sharp)?;
         let finest = FinestMaps::new(self.device, &view.scene.materials)?;
         let effort = Effort { samples: effort.rays, noise: effort.noise, progress };

@@ -14,7 +14,8 @@ use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{Camera, Material, Scene};
 use ndfmap_trace::filtered::Lookups;
-use ndfmap_trace::truth::{Effort, TruePicture};
+use ndfmap_trace::truth::{Effort, TruePicture, Truth};
+use ndfmap_trace::{Geometry, Relief};
 use serde_json::Value;
 
 use crate::Failure;
@@ -31,6 +32,31 @@ pub(crate) struct View<'a, S> {
 pub(crate) struct Drawn {
     pub(crate) picture: Picture,
     pub(crate) milliseconds: f64,
+}
+
+/// What the CPU renderer's truth hits, of a scene with relief or without.
+pub(crate) struct TrueGeometry {
+    plain: Geometry,
+    relief: Option<Relief>,
+}
+
+impl TrueGeometry {
+    pub(crate) fn new(scene: &Scene) -> Self {
+        if !scene.has_relief() {
+            return Self { plain: Geometry::new(scene), relief: None };
+        }
+        let relief = Relief::new(scene);
+        let (facets, bytes) = (relief.facets() as f64 / 1e6, relief.bytes() as f64 / 1e6);
+        eprintln!("ndfmap: displaced truth: {facets:.1} million facets, {bytes:.0} MB");
+        Self { plain: Geometry::without_relief(scene), relief: Some(relief) }
+    }
+
+    pub(crate) fn truth<'a>(&'a self, scene: &'a Scene) -> Truth<'a> {
+        match &self.relief {
+            Some(relief) => Truth::displaced(scene, &self.plain, relief),
+            None => Truth::new(scene, &self.plain),
+        }
+    }
 }
 
 /// What renders.
@@ -55,8 +81,8 @@ pub(crate) trait Engine {
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<Self::Maps<'a>, Failure>;
 
-    /// Sets a scene up.
-    fn set(&self, scene: &Scene) -> Result<Self::Set, Failure>;
+    /// Sets a scene up for pictures of this size from where its camera is, or less than a pixel away.
+    fn set(&self, scene: &Scene, size: Size) -> Result<Self::Set, Failure>;
 
     /// Renders by brute force.
     fn truth(

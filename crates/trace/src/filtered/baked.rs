@@ -1,6 +1,6 @@
 //! A baked material: look-ups of its map's channels and of what it is made of.
 
-use glam::DVec3;
+use glam::{DMat2, DVec3};
 use ndfmap_core::lookup::{Lookup, PixelFootprint, Texels};
 use ndfmap_core::ndf::{FilteredTexel, Lit, Method, Prepared};
 use ndfmap_core::pyramid::Precision;
@@ -22,6 +22,8 @@ pub(super) struct Shading<'a> {
     pub(super) material: &'a Material,
     pub(super) method: &'a dyn Method,
     pub(super) prepared: &'a Prepared,
+    /// On a displaced surface, how slopes of the map lie on it.
+    pub(super) relief: Option<DMat2>,
 }
 
 impl Baked {
@@ -98,7 +100,7 @@ impl Baked {
             finish: &finish,
             prepared: shading.prepared,
             at_means: lookups.at_means,
-            relief: None,
+            relief: shading.relief,
         };
         shading.method.reflect(&texel, &material.reflection, lights)
     }

@@ -13,6 +13,7 @@ use ndfmap_core::lookup::{Filtering, PixelFootprint};
 use ndfmap_core::metrics::Picture;
 use ndfmap_core::ndf::{Lit, Method, Prepared};
 use ndfmap_core::pyramid::Precision;
+use ndfmap_core::reflection::Way;
 use ndfmap_core::scene::{Camera, Material, Rays, Scene};
 use rayon::prelude::*;
 
@@ -43,6 +44,8 @@ const PARTS: usize = 4;
 /// The maps of a scene's materials, baked with one method. Camera, lights, BRDFs, models and meshes may change after.
 pub struct BakedMaps<'a> {
     method: &'a dyn Method,
+    /// The method knows of displacement.
+    displaces: bool,
     materials: Vec<Baked>,
 }
 
@@ -58,7 +61,11 @@ impl<'a> BakedMaps<'a> {
         let count = materials.len() as f64;
         let bake =
             |(i, material)| Baked::new(material, method, precision, &|f| progress((i as f64 + f) / count));
-        Self { method, materials: materials.iter().enumerate().map(bake).collect() }
+        Self {
+            method,
+            displaces: method.shader().displaces,
+            materials: materials.iter().enumerate().map(bake).collect(),
+        }
     }
 }
 
@@ -139,7 +146,7 @@ impl Filtered<'_> {
     fn look(&self, rays: &Rays, at: DVec2) -> Option<(Hit, Place)> {
         let direction = rays.direction(at);
         let hit = self.geometry.hit(rays.eye, direction)?;
-        Some((hit, self.geometry.place(&hit, direction)))
+        Some((hit, self.geometry.place(&hit, direction, self.maps.displaces)))
     }
 
     /// A pixel as the mean of its parts.
@@ -165,7 +172,9 @@ impl Filtered<'_> {
         let Some((hit, place)) = hit else { return self.scene.background.as_dvec3() };
         let wo = place.frame.transpose() * -rays.direction(at);
         scratch.lights.clear();
-        let lit = ways(&self.scene.lights, (place.position, place.frame), wo);
+        let relief = place.stretch.filter(|_| self.maps.displaces);
+        let between = if relief.is_some() { Way::between } else { Way::new };
+        let lit = ways(&self.scene.lights, (place.position, place.frame), wo, between);
         scratch.lights.extend(lit.map(|(way, irradiance)| Lit { way, irradiance }));
         if scratch.lights.is_empty() {
             return DVec3::ZERO;
@@ -176,6 +185,7 @@ impl Filtered<'_> {
             material: &self.scene.materials[place.material],
             method: self.maps.method,
             prepared: &how.prepared[place.material],
+            relief,
         };
         let Scratch { channels, lights } = scratch;
         self.maps.materials[place.material].shade(&shading, &pixel, how.lookups, (channels, lights))

@@ -7,9 +7,10 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DMat3, DVec2, DVec3, Vec3};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::metrics::{Picture, relative_l2};
+use ndfmap_core::reflection::{Finish, Model, Way};
 use ndfmap_core::scene::{Camera, Material, Rays, Scene};
 use ndfmap_core::surface::{SurfaceRow, Wraps};
 use rand::{RngExt, SeedableRng};
@@ -18,6 +19,7 @@ use rayon::prelude::*;
 
 use crate::drift;
 use crate::geometry::{Geometry, Place};
+use crate::relief::{Facet, Relief};
 use crate::ways;
 
 /// Strata a pixel is cut into on each axis; every pass sends a ray through each.
@@ -55,10 +57,30 @@ struct Finest<'a> {
     wraps: Wraps,
 }
 
+impl Finest<'_> {
+    /// The texel `displaced` (in texels) from a place.
+    fn texel(&self, uv: DVec2, displaced: DVec2) -> (usize, usize) {
+        let size = self.normals.size();
+        let at = uv * DVec2::new(size.width as f64, size.height as f64) + displaced;
+        (
+            self.wraps.x.index(at.x.floor() as isize, size.width),
+            self.wraps.y.index(at.y.floor() as isize, size.height),
+        )
+    }
+
+    /// What a texel is made of.
+    fn finish(&self, x: usize, y: usize) -> Finish {
+        let own = self.material.finish;
+        self.material.finish_map.as_ref().map_or(own, |map| map.at(x, y, own.specular))
+    }
+}
+
 /// A scene, ready to be rendered by brute force.
 pub struct Truth<'a> {
     scene: &'a Scene,
     geometry: &'a Geometry,
+    /// What of the scene is displaced; the rest is in `geometry`.
+    relief: Option<&'a Relief>,
     materials: Vec<Finest<'a>>,
 }
 
@@ -77,7 +99,13 @@ impl<'a> Truth<'a> {
             });
             Finest { material, normals, wraps: surface.wraps() }
         };
-        Self { scene, geometry, materials: scene.materials.iter().map(finest).collect() }
+        Self { scene, geometry, relief: None, materials: scene.materials.iter().map(finest).collect() }
+    }
+
+    /// The same of a displaced scene: the meshes that have relief by its facets, and by `geometry` those that have none.
+    #[must_use]
+    pub fn displaced(scene: &'a Scene, geometry: &'a Geometry, relief: &'a Relief) -> Self {
+        Self { relief: Some(relief), ..Self::new(scene, geometry) }
     }
 
     /// Renders until the effort is spent. `progress` is told the fraction done.
@@ -180,32 +208,66 @@ impl<'a> Truth<'a> {
     fn ray(&self, rays: &Rays, corner: DVec2, width: f64, random: &mut Pcg64Mcg) -> DVec3 {
         let [u, v, s, t]: [f64; 4] = random.random();
         let direction = rays.direction(corner + DVec2::new(u, v) * width);
-        match self.geometry.hit(rays.eye, direction) {
+        let plain = self.geometry.hit(rays.eye, direction);
+        let limit = plain.map_or(f64::INFINITY, |hit| hit.distance);
+        if let Some(relief) = self.relief
+            && let Some(hit) = relief.hit(rays.eye, direction, limit)
+        {
+            return self.shade_facet(&relief.facet(&hit, direction), -direction, DVec2::new(s, t) - 0.5);
+        }
+        match plain {
             Some(hit) => {
-                self.shade(&self.geometry.place(&hit, direction), -direction, DVec2::new(s, t) - 0.5)
+                self.shade(&self.geometry.place(&hit, direction, false), -direction, DVec2::new(s, t) - 0.5)
             }
             None => self.scene.background.as_dvec3(),
         }
     }
 
+    /// Light that a facet of relief sends to the eye, made of what the texel `displaced` from it is. Where facets shade each other, a light
+    /// that something stands before adds nothing.
+    fn shade_facet(&self, facet: &Facet, eye: DVec3, displaced: DVec2) -> DVec3 {
+        let finest = &self.materials[facet.material];
+        let (x, y) = finest.texel(facet.uv, displaced);
+        let (reflection, finish) = (&finest.material.reflection, finest.finish(x, y));
+        let (tangent, bitangent) = facet.normal.any_orthonormal_pair();
+        let frame = DMat3::from_cols(tangent, bitangent, facet.normal);
+        let wo = frame.transpose() * eye;
+        let lit = ways(&self.scene.lights, (facet.position, frame), wo, Way::between);
+        let of = |(way, irradiance): (Way, DVec3)| {
+            if reflection.model == Model::Shadowed && self.in_shadow(facet, &way, frame) {
+                return DVec3::ZERO;
+            }
+            irradiance * reflection.facet(DVec3::Z, &finish, &way)
+        };
+        lit.map(of).sum()
+    }
+
+    /// True where something stands between a facet and the light of a way. Lights at a place are taken to be behind everything.
+    fn in_shadow(&self, facet: &Facet, way: &Way, frame: DMat3) -> bool {
+        if way.wi.z <= 0.0 {
+            return true;
+        }
+        let Some(relief) = self.relief else { return false };
+        let towards = frame * way.wi;
+        let from = facet.position + facet.normal * (LIFT * relief.radius());
+        relief.hit(from, towards, f64::INFINITY).is_some() || self.geometry.hit(from, towards).is_some()
+    }
+
     /// Light that the texel `displaced` (in texels) from a place sends to the eye.
     fn shade(&self, place: &Place, eye: DVec3, displaced: DVec2) -> DVec3 {
-        let Finest { material, normals, wraps } = &self.materials[place.material];
-        let size = normals.size();
-        let at = place.uv * DVec2::new(size.width as f64, size.height as f64) + displaced;
-        let (x, y) = (
-            wraps.x.index(at.x.floor() as isize, size.width),
-            wraps.y.index(at.y.floor() as isize, size.height),
-        );
-        let n = normals.row(y)[x].as_dvec3();
-        let own = material.finish;
-        let finish = material.finish_map.as_ref().map_or(own, |map| map.at(x, y, own.specular));
+        let finest = &self.materials[place.material];
+        let (x, y) = finest.texel(place.uv, displaced);
+        let (material, finish) = (finest.material, finest.finish(x, y));
+        let n = finest.normals.row(y)[x].as_dvec3();
         let wo = place.frame.transpose() * eye;
-        ways(&self.scene.lights, (place.position, place.frame), wo)
+        ways(&self.scene.lights, (place.position, place.frame), wo, Way::new)
             .map(|(way, irradiance)| irradiance * material.reflection.facet(n, &finish, &way))
             .sum()
     }
 }
+
+/// What a shadow ray starts off the surface by, of the scene's size.
+const LIFT: f64 = 1e-7;
 
 /// One seed of several numbers (the finaliser of SplitMix64, Steele et al. 2014, over a running sum).
 fn mix(stream: [u64; 3]) -> u64 {
