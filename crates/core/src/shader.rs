@@ -100,6 +100,7 @@ pub fn link(method: &dyn Method, lobe: &dyn Brdf, attributes: usize) -> String {
         ("TABLE", own.table as u32),
     ];
     let mut text: String = constants.iter().map(|(name, value)| value.declare(name)).collect();
+    text += &own.displaces.declare("DISPLACES");
     text += &own.constants;
     let plain: &[&str] = if own.displaces { &[] } else { &[include_str!("ndf/undisplaced.wgsl")] };
     for source in SHARED.iter().chain([&lobe.shader()]).chain(own.sources).chain(plain) {

@@ -1,25 +1,25 @@
 //! A scene's triangles in the GPU's memory.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec3, Vec3, Vec4};
-use ndfmap_core::grid::Size;
-use ndfmap_core::scene::{Camera, Mesh, Scene, Vertex};
+use glam::{DVec3, Mat2, Vec3, Vec4};
+use ndfmap_core::scene::{Mesh, Object, Scene, Vertex};
 
 use crate::{Device, GpuError};
 
 /// `Vertex` in `scene.wgsl`.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct Corner {
+pub(crate) struct Corner {
     position_u: Vec4,
     normal_v: Vec4,
     tangent: Vec4,
+    stretch: Vec4,
 }
 
 /// `Triangle` in `scene.wgsl`.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct Triangle {
+pub(crate) struct Triangle {
     face: Vec4,
     grad_u: Vec4,
     grad_v: Vec4,
@@ -44,60 +44,89 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// Uploads the meshes, those with relief cut and displaced for a picture of this size.
-    ///
-    /// # Errors
-    /// [`GpuError`] for a scene larger than the device's buffers.
-    pub fn displaced(device: &Device, scene: &Scene, camera: &Camera, size: Size) -> Result<Self, GpuError> {
-        let _ = (camera, size);
-        Self::new(device, scene)
-    }
-
-    /// Uploads the meshes.
+    /// Uploads the meshes; those with relief as they are without. [`crate::Meshes`] cuts those.
     ///
     /// # Errors
     /// [`GpuError`] for a scene larger than the device's buffers.
     pub fn new(device: &Device, scene: &Scene) -> Result<Self, GpuError> {
-        let (middle, radius) = scene.bounds();
-        let (mut vertices, mut corners, mut triangles, mut parts) = (vec![], vec![], vec![], vec![]);
-        for (number, object) in scene.objects.iter().enumerate() {
-            let (first, base) = (corners.len() as u32, vertices.len() as u32);
-            vertices.extend(object.mesh.vertices.iter().map(|v| corner(v, middle)));
-            corners.extend(object.mesh.triangles.iter().flatten().map(|i| base + i));
-            let triangle = |t: &[u32; 3]| triangle(&object.mesh, t, number);
-            triangles.extend(object.mesh.triangles.iter().map(triangle));
-            parts.push(Part { material: object.material, corners: first..corners.len() as u32 });
+        let count = |f: fn(&Mesh) -> usize| scene.objects.iter().map(|o| f(&o.mesh) as u64).sum();
+        let total = (count(|m| m.vertices.len()), count(|m| m.triangles.len()));
+        let geometry = Self::empty(device, total, scene.bounds())?;
+        let (mut parts, mut first) = (Vec::new(), (0, 0));
+        for (number, Object { mesh, material }) in scene.objects.iter().enumerate() {
+            let vertices: Vec<Corner> =
+                (0..mesh.vertices.len()).map(|i| corner(mesh, i, geometry.middle)).collect();
+            let corners: Vec<u32> = mesh.triangles.iter().flatten().map(|i| first.0 + i).collect();
+            let triangles: Vec<Triangle> = mesh.triangles.iter().map(|t| triangle(mesh, t, number)).collect();
+            geometry.fill(device, (&vertices, &corners, &triangles), first);
+            let next = (first.0 + vertices.len() as u32, first.1 + triangles.len() as u32);
+            parts.push(Part { material: *material, corners: 3 * first.1..3 * next.1 });
+            first = next;
         }
+        Ok(Self { parts, ..geometry })
+    }
+
+    /// Room for so many vertices and triangles.
+    pub(crate) fn empty(
+        device: &Device,
+        (vertices, triangles): (u64, u64),
+        (middle, radius): (DVec3, f64),
+    ) -> Result<Self, GpuError> {
         // A scene of nothing still needs buffers.
-        if triangles.is_empty() {
-            vertices.push(Corner::zeroed());
-            corners.push(0);
-            triangles.push(Triangle::zeroed());
-        }
-        let upload = |what: &'static str, bytes: &[u8]| {
-            device.check_bytes(what, bytes.len() as u64)?;
-            Ok(device.upload(bytes, wgpu::BufferUsages::STORAGE))
-        };
+        let room =
+            |what: &'static str, count: u64, each: usize| device.storage(what, count.max(1) * each as u64);
         Ok(Self {
-            vertices: upload("the vertices", bytemuck::cast_slice(&vertices))?,
-            corners: upload("the triangles' corners", bytemuck::cast_slice(&corners))?,
-            triangles: upload("the triangles", bytemuck::cast_slice(&triangles))?,
-            parts,
+            vertices: room("the vertices", vertices, size_of::<Corner>())?,
+            corners: room("the triangles' corners", 3 * triangles, size_of::<u32>())?,
+            triangles: room("the triangles", triangles, size_of::<Triangle>())?,
+            parts: Vec::new(),
             middle,
             radius,
         })
     }
+
+    /// Writes vertices, corners and triangles from the given vertex and triangle on.
+    pub(crate) fn fill(
+        &self,
+        device: &Device,
+        (vertices, corners, triangles): (&[Corner], &[u32], &[Triangle]),
+        (first_vertex, first_triangle): (u32, u32),
+    ) {
+        let write = |buffer: &wgpu::Buffer, first: usize, bytes: &[u8]| {
+            device.queue.write_buffer(buffer, first as u64, bytes);
+        };
+        let (vertex, triangle) = (first_vertex as usize, first_triangle as usize);
+        write(&self.vertices, vertex * size_of::<Corner>(), bytemuck::cast_slice(vertices));
+        write(&self.corners, 3 * triangle * size_of::<u32>(), bytemuck::cast_slice(corners));
+        write(&self.triangles, triangle * size_of::<Triangle>(), bytemuck::cast_slice(triangles));
+    }
+
+    /// How many triangles there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.parts.last().map_or(0, |part| part.corners.end as usize / 3)
+    }
+
+    /// True for a scene of nothing.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
 }
 
-fn corner(v: &Vertex, middle: DVec3) -> Corner {
+/// Vertex `i` of a mesh.
+pub(crate) fn corner(mesh: &Mesh, i: usize, middle: DVec3) -> Corner {
+    let v: &Vertex = &mesh.vertices[i];
+    let stretch = mesh.stretches.get(i).copied().unwrap_or(Mat2::IDENTITY);
     Corner {
         position_u: (v.position.as_dvec3() - middle).as_vec3().extend(v.uv.x),
         normal_v: v.normal.extend(v.uv.y),
         tangent: v.tangent,
+        stretch: Vec4::from_array(stretch.to_cols_array()),
     }
 }
 
-fn triangle(mesh: &Mesh, corners: &[u32; 3], object: usize) -> Triangle {
+pub(crate) fn triangle(mesh: &Mesh, corners: &[u32; 3], object: usize) -> Triangle {
     let [a, b, c] = corners.map(|i| mesh.vertices[i as usize]);
     let (p, q) = ((b.position - a.position).as_dvec3(), (c.position - a.position).as_dvec3());
     let (du, dv) = ((b.uv - a.uv).as_dvec2(), (c.uv - a.uv).as_dvec2());

@@ -14,6 +14,7 @@ pub mod link;
 mod maps;
 mod pipelines;
 mod renderer;
+mod tessellation;
 mod truth;
 mod uniforms;
 
@@ -23,4 +24,5 @@ pub use error::GpuError;
 pub use geometry::Geometry;
 pub use maps::Maps;
 pub use renderer::{Lookups, Renderer, Sampling, Shown};
+pub use tessellation::Meshes;
 pub use truth::{Effort, FinestMaps, LEAST_SAMPLES, TruePicture};

@@ -16,7 +16,7 @@ use crate::grid::Size;
 const EDGE_PIXELS: f64 = 5.7;
 
 /// Heights are those of a scale this many pixels wide: what triangles of that size can show.
-const HEIGHT_PIXELS: f64 = 2.0;
+pub const HEIGHT_PIXELS: f64 = 2.0;
 
 /// Most segments on a side of a patch.
 const MOST_SEGMENTS: u32 = 512;

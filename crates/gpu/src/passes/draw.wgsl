@@ -22,13 +22,18 @@ fn plain_finish(diffuse_gloss: vec4<f32>, specular: vec4<f32>) -> Finish {
 fn shade(place: Place, channels: ptr<function, Channels>, plain: Finish) -> vec3<f32> {
     var decoded = decode(channels);
     var sum = vec3<f32>(0.0);
-    if place.wo.z <= 0.0 {
+    // A facet of relief may face what its base turns its back on.
+    let relief = DISPLACES && place.relief;
+    if place.wo.z <= 0.0 && !relief {
         return sum;
     }
     for (var i = 0u; i < view.lights; i++) {
         let light = seen_from(place, i);
-        if light.wi.z > 0.0 {
-            let way = way_between(light.wi, place.wo);
+        let way = way_between(light.wi, place.wo);
+        if relief {
+            let light_of = reflect_displaced(channels, &decoded, plain, material.reflection, way, place.stretch);
+            sum += light.irradiance * light_of;
+        } else if light.wi.z > 0.0 {
             sum += light.irradiance * reflect_texel(channels, &decoded, plain, material.reflection, way);
         }
     }
@@ -63,7 +68,7 @@ fn filtered(in: Varying) -> @location(0) vec4<f32> {
     if masked_out(in.pixel) {
         return vec4<f32>(0.0);
     }
-    let place = place_of(in);
+    let place = place_of(in, DISPLACES);
     let around = taps_of(place);
     var channels = Channels();
     let count = around.columns * around.rows;
@@ -85,7 +90,7 @@ fn sampled(in: Varying) -> @location(0) vec4<f32> {
     if masked_out(in.pixel) {
         return vec4<f32>(0.0);
     }
-    let place = place_of(in);
+    let place = place_of(in, DISPLACES);
     var channels = Channels();
     for (var layer = 0u; layer < ALL_LAYERS; layer++) {
         channels[layer] = textureSampleGrad(map, linear, place.uv, layer, place.duv_dx, place.duv_dy);
@@ -103,7 +108,7 @@ fn neighbours(in: Varying) -> @location(0) vec4<f32> {
     if masked_out(in.pixel) {
         return vec4<f32>(0.0);
     }
-    let place = place_of(in);
+    let place = place_of(in, DISPLACES);
     let around = taps_of(place);
     let plain = filtered_finish(around);
     let repeat = vec2<bool>((material.repeat & 1u) != 0u, (material.repeat & 2u) != 0u);

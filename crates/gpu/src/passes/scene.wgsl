@@ -34,12 +34,14 @@ struct Vertex {
     normal_v: vec4<f32>,
     // Unit tangent, and the sign of the bitangent.
     tangent: vec4<f32>,
+    // With relief, how slopes of the map lie on the surface, by columns.
+    stretch: vec4<f32>,
 }
 
 struct Triangle {
     // Unit normal, and the object.
     face: vec4<f32>,
-    // How u and v change with the place.
+    // How u and v change with the place; the first has a 1 on a mesh with relief.
     grad_u: vec4<f32>,
     grad_v: vec4<f32>,
 }
@@ -72,6 +74,7 @@ struct Varying {
     @location(3) uv: vec2<f32>,
     @location(4) @interpolate(flat) bitangent_sign: f32,
     @location(5) @interpolate(flat) triangle: u32,
+    @location(6) stretch: vec4<f32>,
 }
 
 @vertex
@@ -80,7 +83,7 @@ fn project(@builtin(vertex_index) i: u32) -> Varying {
     let first = vertices[corners[i - i % 3u]];
     let clip = view.clip * vec4<f32>(v.position_u.xyz - view.eye, 1.0);
     let uv = vec2<f32>(v.position_u.w, v.normal_v.w);
-    return Varying(clip, v.position_u.xyz, v.normal_v.xyz, v.tangent.xyz, uv, first.tangent.w, i / 3u);
+    return Varying(clip, v.position_u.xyz, v.normal_v.xyz, v.tangent.xyz, uv, first.tangent.w, i / 3u, v.stretch);
 }
 
 // What lies under a pixel.
@@ -94,6 +97,9 @@ struct Place {
     // Change of uv to the next pixel on the right, and below.
     duv_dx: vec2<f32>,
     duv_dy: vec2<f32>,
+    // On a mesh with relief, how slopes of the map lie in the frame.
+    relief: bool,
+    stretch: mat2x2<f32>,
 }
 
 // Least cosine between a place's normal and the eye.
@@ -110,7 +116,8 @@ fn differential(step: vec3<f32>, ray: vec3<f32>, face: vec3<f32>, distance: f32)
     return distance * inverseSqrt(dot(ray, ray)) * (step - ray * (dot(step, face) / held));
 }
 
-fn place_of(in: Varying) -> Place {
+// `unbent`: facets of relief are shaded where the base mesh turns its back, too.
+fn place_of(in: Varying, unbent: bool) -> Place {
     let triangle = triangles[in.triangle];
     let ray = view.corner + view.right * in.pixel.x + view.down * in.pixel.y;
     let direction = normalize(ray);
@@ -118,7 +125,8 @@ fn place_of(in: Varying) -> Place {
     var normal = normalize(in.normal) * side;
     // Where the normal between corners has turned away from the eye, it is bent back until it just does not.
     let facing = -dot(normal, direction);
-    if facing < LEAST_FACING {
+    let relief = triangle.grad_u.w == 1.0;
+    if facing < LEAST_FACING && !(unbent && relief) {
         normal = normalize(normal - direction * (LEAST_FACING - facing));
     }
     let across = reject(in.tangent, normal);
@@ -137,6 +145,9 @@ fn place_of(in: Varying) -> Place {
         in.uv,
         vec2<f32>(dot(triangle.grad_u.xyz, dx), dot(triangle.grad_v.xyz, dx)),
         vec2<f32>(dot(triangle.grad_u.xyz, dy), dot(triangle.grad_v.xyz, dy)),
+        relief,
+        // From behind, what stands out goes in, along the turned frame.
+        mat2x2<f32>(side * in.stretch.x, in.stretch.y, side * in.stretch.z, in.stretch.w),
     );
 }
 

@@ -26,7 +26,7 @@ fn wrapped(t: f32, n: f32, repeat: bool) -> i32 {
 
 @fragment
 fn truth(in: Varying) -> @location(0) vec4<f32> {
-    let place = place_of(in);
+    let place = place_of(in, false);
     // The bilinear mix of what texels reflect: the texel under a point displaced by up to half a texel either way.
     let displaced = vec2<f32>(random(in.pixel.xy, 0u), random(in.pixel.xy, 1u)) - 0.5;
     let at = place.uv * material.texels + displaced;

@@ -5,8 +5,8 @@ use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{Material, Scene};
 use ndfmap_gpu::{
-    Canvas, Device, Effort, FinestMaps, Geometry, GpuError, Lookups, Maps, Outlines, Renderer, Sampling,
-    Shown,
+    Canvas, Device, Effort, FinestMaps, Geometry, GpuError, Lookups, Maps, Meshes, Outlines, Renderer,
+    Sampling, Shown,
 };
 use ndfmap_trace::filtered;
 use ndfmap_trace::truth::{self, TruePicture};
@@ -74,7 +74,7 @@ impl Engine for Gpu<'_> {
     }
 
     fn set(&self, scene: &Scene, size: Size) -> Result<Geometry, Failure> {
-        Ok(Geometry::displaced(self.device, scene, &scene.camera, size)?)
+        Ok(Meshes::new(self.device, scene)?.cut(&scene.camera, size)?)
     }
 
     fn truth(

@@ -1,0 +1,211 @@
+//! Meshes with relief on the GPU: cut anew for each picture, their points and triangles worked out by compute passes.
+//!
+//! A picture costs a plan on the CPU, a pass over the base mesh; what is in memory is bounded by the picture's pixels, not by the map.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Vec3};
+use ndfmap_core::grid::Size;
+use ndfmap_core::lookup::Texels;
+use ndfmap_core::scene::tessellation::{HEIGHT_PIXELS, Plan, plan};
+use ndfmap_core::scene::{Camera, Object, Relief, Scene};
+use ndfmap_core::surface::Wrap;
+
+use crate::geometry::{Corner, Geometry, Part, Triangle, corner, triangle};
+use crate::{Device, GpuError};
+
+/// The twin of core's tessellation.
+const TWIN: &str = include_str!("../../core/src/scene/tessellation.wgsl");
+
+/// What both passes share.
+const HEIGHTS: &str = include_str!("passes/heights.wgsl");
+
+/// `Cut` in `heights.wgsl`.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Cut {
+    eye: Vec3,
+    width: f32,
+    texels: [u32; 2],
+    levels: u32,
+    repeat: u32,
+    depth: f32,
+    patches: u32,
+    points: u32,
+    triangles: u32,
+    first_point: u32,
+    first_triangle: u32,
+    object: u32,
+    unused: u32,
+}
+
+/// A mesh, as it is before it is cut.
+enum Base {
+    /// One without relief: what is drawn.
+    Plain {
+        vertices: Vec<Corner>,
+        corners: Vec<u32>,
+        triangles: Vec<Triangle>,
+    },
+    Relief {
+        vertices: wgpu::Buffer,
+        corners: wgpu::Buffer,
+        heights: wgpu::Buffer,
+    },
+}
+
+/// The meshes of a scene in the GPU's memory, to be cut for any picture.
+pub struct Meshes<'a> {
+    device: &'a Device,
+    scene: &'a Scene,
+    bases: Vec<Base>,
+    points: wgpu::ComputePipeline,
+    facets: wgpu::ComputePipeline,
+    middle: DVec3,
+    radius: f64,
+}
+
+impl<'a> Meshes<'a> {
+    /// Uploads the meshes and the heights of what has relief.
+    ///
+    /// # Errors
+    /// [`GpuError`] for a scene larger than the device's buffers.
+    pub fn new(device: &'a Device, scene: &'a Scene) -> Result<Self, GpuError> {
+        let (middle, radius) = scene.bounds();
+        let base = |(number, object): (usize, &Object)| {
+            let vertices: Vec<Corner> =
+                (0..object.mesh.vertices.len()).map(|i| corner(&object.mesh, i, middle)).collect();
+            let corners = || object.mesh.triangles.as_flattened();
+            let Some(relief) = &scene.materials[object.material].relief else {
+                let triangles =
+                    object.mesh.triangles.iter().map(|t| triangle(&object.mesh, t, number)).collect();
+                return Ok(Base::Plain { vertices, corners: corners().to_vec(), triangles });
+            };
+            let upload = |what: &'static str, bytes: &[u8]| {
+                device.check_bytes(what, bytes.len() as u64)?;
+                Ok(device.upload(bytes, wgpu::BufferUsages::STORAGE))
+            };
+            Ok(Base::Relief {
+                vertices: upload("the vertices", bytemuck::cast_slice(&vertices))?,
+                corners: upload("the triangles' corners", bytemuck::cast_slice(corners()))?,
+                heights: upload("the heights", bytemuck::cast_slice(&all_heights(relief)))?,
+            })
+        };
+        Ok(Self {
+            device,
+            scene,
+            bases: scene.objects.iter().enumerate().map(base).collect::<Result<_, GpuError>>()?,
+            points: device.compute_pipeline(&[TWIN, HEIGHTS, include_str!("passes/points.wgsl")].join("\n")),
+            facets: device.compute_pipeline(&[TWIN, HEIGHTS, include_str!("passes/facets.wgsl")].join("\n")),
+            middle,
+            radius,
+        })
+    }
+
+    /// Cuts what has relief for a picture of this size.
+    ///
+    /// # Errors
+    /// [`GpuError`] for more triangles than the device's buffers hold.
+    pub fn cut(&self, camera: &Camera, size: Size) -> Result<Geometry, GpuError> {
+        let rays = camera.rays(size);
+        let plans: Vec<Option<(Plan, &Relief)>> = (self.scene.objects.iter())
+            .map(|object| {
+                let relief = self.scene.materials[object.material].relief.as_ref()?;
+                Some((plan(&object.mesh, relief, &rays, size), relief))
+            })
+            .collect();
+        let counts = |i: usize| match (&plans[i], &self.bases[i]) {
+            (Some((plan, _)), _) => (plan.points, plan.triangles),
+            (None, Base::Plain { vertices, triangles, .. }) => {
+                (vertices.len() as u32, triangles.len() as u32)
+            }
+            (None, Base::Relief { .. }) => (0, 0),
+        };
+        let total = (0..plans.len()).map(counts).fold((0_u64, 0_u64), |(p, t), (points, triangles)| {
+            (p + u64::from(points), t + u64::from(triangles))
+        });
+        let geometry = Geometry::empty(self.device, total, (self.middle, self.radius))?;
+        let (mut parts, mut first) = (Vec::new(), (0, 0));
+        for (i, object) in self.scene.objects.iter().enumerate() {
+            let (points, triangles) = counts(i);
+            match (&plans[i], &self.bases[i]) {
+                (Some((plan, relief)), Base::Relief { .. }) => {
+                    let cut = Cut {
+                        eye: (rays.eye - self.middle).as_vec3(),
+                        width: (HEIGHT_PIXELS * rays.right.length()) as f32,
+                        object: i as u32 + 1,
+                        ..of_relief(relief, plan, first)
+                    };
+                    self.expand(&geometry, i, &cut, plan);
+                }
+                (_, Base::Plain { vertices, corners, triangles }) => {
+                    let corners: Vec<u32> = corners.iter().map(|c| c + first.0).collect();
+                    geometry.fill(self.device, (vertices, &corners, triangles), first);
+                }
+                (None, Base::Relief { .. }) => {}
+            }
+            parts.push(Part { material: object.material, corners: 3 * first.1..3 * (first.1 + triangles) });
+            first = (first.0 + points, first.1 + triangles);
+        }
+        Ok(Geometry { parts, ..geometry })
+    }
+
+    /// Works out points and triangles of one mesh.
+    fn expand(&self, geometry: &Geometry, object: usize, cut: &Cut, plan: &Plan) {
+        let Base::Relief { vertices, corners, heights } = &self.bases[object] else { return };
+        if plan.patches.is_empty() {
+            return;
+        }
+        let of = |p: &ndfmap_core::scene::tessellation::Patch| {
+            let [a, b, c] = p.edges;
+            [p.triangle, p.segments, a, b, c, p.first_point, p.first_triangle]
+        };
+        let patches: Vec<[u32; 7]> = plan.patches.iter().map(of).collect();
+        let patches = self.device.upload(bytemuck::cast_slice(&patches), wgpu::BufferUsages::STORAGE);
+        let cut = self.device.upload(bytemuck::bytes_of(cut), wgpu::BufferUsages::UNIFORM);
+        let run = |pipeline: &wgpu::ComputePipeline, buffers: &[&wgpu::Buffer], count: u32| {
+            let all = [&cut, &patches].into_iter().chain(buffers.iter().copied());
+            let entries: Vec<wgpu::BindGroupEntry<'_>> = all
+                .enumerate()
+                .map(|(binding, buffer)| wgpu::BindGroupEntry {
+                    binding: binding as u32,
+                    resource: buffer.as_entire_binding(),
+                })
+                .collect();
+            let group = self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("tessellation"),
+                layout: &pipeline.get_bind_group_layout(0),
+                entries: &entries,
+            });
+            self.device.dispatch(pipeline, &group, count);
+        };
+        run(&self.points, &[vertices, corners, heights, &geometry.vertices], plan.points);
+        run(&self.facets, &[&geometry.vertices, &geometry.corners, &geometry.triangles], plan.triangles);
+    }
+}
+
+/// What does not change from picture to picture, and the plan's numbers.
+fn of_relief(relief: &Relief, plan: &Plan, (first_point, first_triangle): (u32, u32)) -> Cut {
+    let (finest, wraps) = (relief.heights_size(), relief.heights.wraps());
+    let bit = |wrap: Wrap, bit: u32| if wrap == Wrap::Repeat { bit } else { 0 };
+    Cut {
+        texels: [finest.width as u32, finest.height as u32],
+        levels: relief.heights.sizes().len() as u32,
+        repeat: bit(wraps.x, 1) | bit(wraps.y, 2),
+        depth: relief.depth as f32,
+        patches: plan.patches.len() as u32,
+        points: plan.points,
+        triangles: plan.triangles,
+        first_point,
+        first_triangle,
+        ..Cut::zeroed()
+    }
+}
+
+/// Heights of all levels, finest first.
+fn all_heights(relief: &Relief) -> Vec<f32> {
+    let level = |(level, size): (usize, &Size)| {
+        let (width, area) = (size.width, size.area());
+        (0..area).map(move |i| relief.heights.texel(level, i % width, i / width)[0])
+    };
+    relief.heights.sizes().iter().enumerate().flat_map(level).collect()
+}
