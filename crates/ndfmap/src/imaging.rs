@@ -67,6 +67,8 @@ pub(crate) struct Take {
 pub(crate) struct Errors {
     pub(crate) relative_l2: f64,
     pub(crate) color_error: f64,
+    /// Light of the whole picture over the truth's.
+    pub(crate) brightness: f64,
     /// `None` where the program is built without FLIP.
     pub(crate) flip: Option<f64>,
     pub(crate) sparkle: Option<f64>,
@@ -148,6 +150,7 @@ fn frame<E: Engine>(
         let errors = truth.as_ref().map(|truth| Errors {
             relative_l2: relative_l2(&picture, &truth.picture),
             color_error: color_error(&picture, &truth.picture, exposure),
+            brightness: light_of(&picture) / light_of(&truth.picture).max(f64::MIN_POSITIVE),
             flip: flip(&picture, &truth.picture, exposure),
             sparkle,
         });
@@ -182,6 +185,11 @@ fn true_change([a, b]: &[Vec<Picture>; 2], exposure: f32) -> Drifting {
     Drifting { change: change(&still, exposure), noise: change(&noisy, exposure) }
 }
 
+/// All light of a picture.
+fn light_of(picture: &Picture) -> f64 {
+    picture.texels().iter().map(|c| f64::from(c.element_sum())).sum()
+}
+
 /// Mean FLIP of display values, at the library's own distance to a screen.
 #[cfg(feature = "flip")]
 fn flip(picture: &Picture, truth: &Picture, exposure: f32) -> Option<f64> {
@@ -206,7 +214,7 @@ fn flip(_picture: &Picture, _truth: &Picture, _exposure: f32) -> Option<f64> {
 impl Errors {
     /// As JSON.
     pub(crate) fn to_json(self) -> Value {
-        let mut value = json!({ "relative_l2": self.relative_l2, "color_error": self.color_error });
+        let mut value = json!({ "relative_l2": self.relative_l2, "color_error": self.color_error, "brightness": self.brightness });
         if let Some(flip) = self.flip {
             value["flip"] = flip.into();
         }
@@ -226,6 +234,7 @@ impl Reel {
         Some(Errors {
             relative_l2: mean(|e| e.relative_l2),
             color_error: mean(|e| e.color_error),
+            brightness: mean(|e| e.brightness),
             flip: all[0].flip.map(|_| mean(|e| e.flip.unwrap_or(0.0))),
             sparkle: all[0].sparkle.map(|_| mean(|e| e.sparkle.unwrap_or(0.0))),
         })
@@ -278,16 +287,18 @@ impl Reel {
     /// The table for a terminal: a row a method.
     pub(crate) fn to_table(&self) -> String {
         let name = self.methods.iter().map(String::len).max().unwrap_or(0).max("method".len());
-        let mut text = format!("{:name$}  frame ms  color_error  relative_l2    FLIP  sparkle\n", "method");
+        let mut text =
+            format!("{:name$}  frame ms  color_error  relative_l2  brightness    FLIP  sparkle\n", "method");
         for (at, method) in self.methods.iter().enumerate() {
             let [median, ..] = self.frame_ms(at);
             text += &format!("{method:name$} {median:>9.1}");
             if let Some(e) = self.mean_errors(at) {
                 let or_dash = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
                 text += &format!(
-                    "  {:>11.4}  {:>11.3}  {:>6}  {:>7}",
+                    "  {:>11.4}  {:>11.3}  {:>10.3}  {:>6}  {:>7}",
                     e.color_error,
                     e.relative_l2,
+                    e.brightness,
                     or_dash(e.flip),
                     or_dash(e.sparkle)
                 );

@@ -12,7 +12,7 @@ use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::metrics::{Picture, relative_l2};
 use ndfmap_core::reflection::{Finish, Model, Way};
 use ndfmap_core::scene::{Camera, Material, Rays, Scene};
-use ndfmap_core::surface::{SurfaceRow, Wraps};
+use ndfmap_core::surface::{SurfaceRow, Wraps, normal_of_slope, slope_of_normal};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
@@ -258,7 +258,12 @@ impl<'a> Truth<'a> {
         let finest = &self.materials[place.material];
         let (x, y) = finest.texel(place.uv, displaced);
         let (material, finish) = (finest.material, finest.finish(x, y));
-        let n = finest.normals.row(y)[x].as_dvec3();
+        let n = finest.normals.row(y)[x];
+        // Heights that displace nothing: their slopes as they lie on the mesh.
+        let n = match place.stretch {
+            Some(by) => normal_of_slope((by * slope_of_normal(n).as_dvec2()).as_vec2()).as_dvec3(),
+            None => n.as_dvec3(),
+        };
         let wo = place.frame.transpose() * eye;
         ways(&self.scene.lights, (place.position, place.frame), wo, Way::new)
             .map(|(way, irradiance)| irradiance * material.reflection.facet(n, &finish, &way))
