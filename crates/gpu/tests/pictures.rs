@@ -11,7 +11,7 @@ use ndfmap_core::metrics::{Picture, display, relative_l2};
 use ndfmap_core::ndf;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{self, FinishMap, Scene, Staging};
-use ndfmap_gpu::{Canvas, FinestMaps, Geometry, Lookups, Maps, Outlines, Renderer, Sampling, Shown};
+use ndfmap_gpu::{Canvas, FinestMaps, Geometry, Lookups, Maps, Meshes, Outlines, Renderer, Sampling, Shown};
 use ndfmap_trace::filtered::{self, BakedMaps, Filtered};
 use ndfmap_trace::truth::{Effort, Truth};
 
@@ -178,5 +178,40 @@ fn colours_and_gloss_of_maps_are_drawn_too() {
         let (share, apart) = (off(&drawn, &traced, scene.exposure), relative_l2(&drawn, &traced));
         eprintln!("{spelling}: {share:.5} off, {apart:.5} apart");
         assert!(share <= MAY_DIFFER, "{spelling}: {share} off, {apart} apart");
+    }
+}
+
+#[test]
+fn displaced_scenes_are_the_cpus() {
+    let Some(device) = device() else { return };
+    let (renderer, size) = (Renderer::new(&device), Size { width: 240, height: 200 });
+    let canvas = Canvas::new(&device, size, Outlines::Parts).unwrap();
+    for (name, time, shadows) in
+        [("noise-sphere", 0.1, false), ("armour", 0.2, true), ("desert", 0.4, false), ("plane", 0.0, true)]
+    {
+        let mut scene = staged(name, time, 128);
+        scene.displace(1.0, shadows).unwrap();
+        let on_cpu = ndfmap_trace::Geometry::displaced(&scene, &scene.camera, size);
+        let on_gpu = Meshes::new(&device, &scene).unwrap().cut(&scene.camera, size).unwrap();
+        assert_eq!(on_gpu.len(), on_cpu.len(), "{name}");
+        let shown = Shown { scene: &scene, geometry: &on_gpu, camera: &scene.camera };
+        for spelling in ["slopes", "vmf:4"] {
+            let method = ndf::parse(spelling).unwrap();
+            let ours = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
+            let theirs = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
+            let traced = Filtered { scene: &scene, geometry: &on_cpu, maps: &theirs, progress: &|_| () };
+            let filtering = Filtering::TRILINEAR;
+            let sampling = Sampling::Taps(filtering);
+            renderer
+                .draw(&canvas, &shown, &ours, Lookups { sampling, neighbours: false, at_means: false })
+                .unwrap();
+            let drawn = canvas.read().unwrap();
+            let lookups = filtered::Lookups { filtering, neighbours: false, at_means: false };
+            let traced = traced.render(&scene.camera, size, lookups);
+            let share = off(&drawn, &traced, scene.exposure);
+            eprintln!("{name} displaced, {spelling}: {share:.5} off, {} triangles", on_gpu.len());
+            // Triangles are of a few pixels, and so edges are many.
+            assert!(share < 5.0 * MAY_DIFFER, "{name} {spelling}: {share}");
+        }
     }
 }

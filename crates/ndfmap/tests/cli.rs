@@ -615,3 +615,58 @@ fn compare_measures_pictures_too() {
         std::fs::read_to_string(folder.path().join("report/report.html")).unwrap().contains("In a scene")
     );
 }
+
+#[test]
+fn heights_displace_scenes() {
+    let words = ["render", "--scene", "noise-sphere", "--displace", "--device", "cpu", "--json"];
+    let small = ["--size", "24", "--map-size", "32", "--truth", "32", "-m", "slopes,slopes:9"];
+    let told = json(&[&words[..], &small].concat());
+    assert_eq!(told["method"], "slopes");
+    for method in ["slopes", "slopes:9"] {
+        let error = &told["methods"][method]["error"];
+        // Waves of several pixels: what is asked here is that it is the displaced truth, not how near.
+        assert!(error["relative_l2"].as_f64().unwrap() < 0.3, "{error}");
+        assert!((error["brightness"].as_f64().unwrap() - 1.0).abs() < 0.1, "{error}");
+    }
+    let compared = json(&[
+        "compare",
+        "builtin:noise",
+        "--size",
+        "32",
+        "--methods",
+        "slopes,toksvig",
+        "--scene",
+        "sphere",
+        "--displace",
+        "0.5",
+        "--shadows",
+        "--picture",
+        "24",
+        "--truth",
+        "32",
+        "--json",
+    ]);
+    assert!(
+        compared["methods"]["slopes"]["picture"]["error"]["relative_l2"].as_f64().unwrap() < 0.5,
+        "{compared}"
+    );
+}
+
+#[test]
+fn what_cannot_be_displaced_says_why() {
+    for (words, wanted) in [
+        (
+            &["render", "--scene", "v-groove", "--displace", "--json"][..],
+            "none of the scene's maps has heights",
+        ),
+        (&["render", "--scene", "armour", "--displace", "0", "--json"], "not 0"),
+        (&["render", "--scene", "armour", "--displace", "nan", "--json"], "not 0"),
+        (&["render", "--scene", "armour", "--shadows", "--json"], "--displace"),
+        (&["render", "--scene", "armour", "--displace", "--model", "tan", "--json"], "--model"),
+        (&["bake", "builtin:armour", "-m", "slopes:1", "-o", "x.ktx2"], "2 to 128"),
+    ] {
+        let (status, _, stderr) = outcome(words);
+        assert_eq!(status, 2, "{words:?}: {stderr}");
+        assert!(stderr.contains(wanted), "{words:?}: {stderr}");
+    }
+}

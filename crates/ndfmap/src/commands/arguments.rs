@@ -59,6 +59,8 @@ enum ConventionArgument {
 enum FilterArgument {
     Central,
     Sobel,
+    /// Mean and spread of the surface between the heights, over each texel
+    Bilinear,
 }
 
 impl SourceArguments {
@@ -78,6 +80,7 @@ impl SourceArguments {
             slope_filter: match self.slope_filter {
                 FilterArgument::Central => SlopeFilter::CentralDifference,
                 FilterArgument::Sobel => SlopeFilter::Sobel,
+                FilterArgument::Bilinear => SlopeFilter::Bilinear,
             },
             wraps: self.wrap,
             builtin_size,
