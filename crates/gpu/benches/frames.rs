@@ -12,7 +12,7 @@ use ndfmap_core::ndf::{self, Method};
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{self, Scene, Staging};
 use ndfmap_gpu::{
-    Canvas, Device, Effort, FinestMaps, Geometry, Lookups, Maps, Outlines, Renderer, Sampling, Shown,
+    Canvas, Device, Effort, FinestMaps, Geometry, Lookups, Maps, Meshes, Outlines, Renderer, Sampling, Shown,
 };
 
 const METHODS: &[&str] = &[
@@ -140,6 +140,46 @@ impl Bench<'_> {
         Ok(())
     }
 
+    /// A displaced scene: cutting it, and drawing what is cut, beside drawing it as a normal map.
+    fn displaced(&self, name: &str, time: f64, size: Size) -> Outcome<()> {
+        let flat = staged(name, time, size)?;
+        let mut scene = staged(name, time, size)?;
+        scene.displace(1.0, false)?;
+        let canvas = Canvas::new(self.device, size, Outlines::Sharp)?;
+        let method = ndf::parse("slopes")?;
+        let maps =
+            |scene: &Scene| Maps::new(self.device, &scene.materials, &*method, Precision::Half, &|_| ());
+        let (flat_maps, maps) = (maps(&flat)?, maps(&scene)?);
+        let flat_geometry = Geometry::new(self.device, &flat)?;
+        let meshes = Meshes::new(self.device, &scene)?;
+        let (mut cut, mut drawn, mut plain) = (Vec::new(), Vec::new(), Vec::new());
+        let mut triangles = 0;
+        for turn in 0..=self.runs {
+            let begin = Instant::now();
+            let geometry = meshes.cut(&scene.camera, size)?;
+            self.device.wait()?;
+            let cutting = begin.elapsed().as_secs_f64() * 1e3;
+            triangles = geometry.len();
+            let shown = Shown { scene: &scene, geometry: &geometry, camera: &scene.camera };
+            let drawing = self.renderer.time(&canvas, &shown, &maps, Lookups::TRILINEAR)?;
+            let shown = Shown { scene: &flat, geometry: &flat_geometry, camera: &flat.camera };
+            let flat_drawing = self.renderer.time(&canvas, &shown, &flat_maps, Lookups::TRILINEAR)?;
+            if turn > 0 {
+                cut.push(cutting);
+                drawn.push(drawing);
+                plain.push(flat_drawing);
+            }
+        }
+        let (cut, drawn, plain) = (median(cut), median(drawn), median(plain));
+        println!(
+            "{name} at {time}, displaced, slopes: {triangles} triangles ({:.2} a pixel), cut {cut:.2} ms, drawn {drawn:.2} ms; as a normal map \
+             {plain:.2} ms: {:.2} times",
+            triangles as f64 / size.area() as f64,
+            (cut + drawn) / plain
+        );
+        Ok(())
+    }
+
     fn creature(&self, size: Size) -> Outcome<()> {
         let scene = staged("creature", 0.3, size)?;
         let geometry = Geometry::new(self.device, &scene)?;
@@ -200,6 +240,16 @@ fn main() -> Outcome<()> {
     let bench = Bench { device: &device, renderer: &renderer, runs };
     // 640 x 480 for the default size, as in Han et al.
     bench.creature(Size { width: side * 32 / 25, height: side * 24 / 25 })?;
+    for (name, time) in [
+        ("noise-sphere", 0.0),
+        ("noise-sphere", 0.5),
+        ("noise-sphere", 1.0),
+        ("armour", 0.0),
+        ("armour", 0.5),
+        ("desert", 0.5),
+    ] {
+        bench.displaced(name, time, size)?;
+    }
     for (name, time) in [("disk", 0.15), ("armour", 0.5)] {
         bench.methods(name, time, size)?;
     }
