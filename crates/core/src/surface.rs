@@ -131,7 +131,7 @@ pub trait Surface: Send + Sync {
     /// What lies beyond the edges.
     fn wraps(&self) -> Wraps;
 
-    /// Overwrites all of `row` (as wide as the map) with row `y`.
+    /// Overwrites all of `row` (as wide as the map) with row `y`; its `spread` too, if only to clear it.
     fn read_row(&self, y: usize, row: &mut SurfaceRow);
 
     /// True when the heights mean something.
@@ -356,7 +356,7 @@ mod tests {
     #[test]
     fn bilinear_slopes_are_those_of_the_surface_between_the_heights() {
         // Known answer: the mean over many places of a texel of the surface's own differences.
-        let heights = [[0.3, -0.1, 0.25], [0.7, 0.2, -0.4], [0.05, 0.6, 0.1]].map(|row| row.map(|h: f32| h));
+        let heights = [[0.3, -0.1, 0.25], [0.7, 0.2, -0.4], [0.05, 0.6, 0.1_f32]];
         // At (x, y) from the middle texel, y up, each -1 to 1.
         let height = |x: f64, y: f64| {
             let pair = |t: f64| if t < 0.0 { (0, t + 1.0) } else { (1, t) };

@@ -1,6 +1,6 @@
 //! Meshes with relief on the GPU: cut anew for each picture, their points and triangles worked out by compute passes.
 //!
-//! A picture costs a plan on the CPU, a pass over the base mesh; what is in memory is bounded by the picture's pixels, not by the map.
+//! A picture costs a plan on the CPU, a pass over the base mesh; what is in memory is bounded by that mesh and the picture's pixels, not by the map.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
@@ -35,7 +35,7 @@ struct Cut {
     first_point: u32,
     first_triangle: u32,
     object: u32,
-    unused: u32,
+    texture_width: f32,
 }
 
 /// A mesh, as it is before it is cut.
@@ -192,6 +192,7 @@ fn of_relief(relief: &Relief, plan: &Plan, (first_point, first_triangle): (u32, 
         levels: relief.heights.sizes().len() as u32,
         repeat: bit(wraps.x, 1) | bit(wraps.y, 2),
         depth: relief.depth as f32,
+        texture_width: relief.width as f32,
         patches: plan.patches.len() as u32,
         points: plan.points,
         triangles: plan.triangles,

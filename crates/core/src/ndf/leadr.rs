@@ -108,7 +108,7 @@ impl SlopeGrid {
 
     /// What is between two points.
     pub(super) fn step(n: usize) -> f64 {
-        if n <= 5 { 0.9 } else { 6.0 / (n - 1) as f64 }
+        if n == 5 { 0.9 } else { 6.0 / (n - 1) as f64 }
     }
 
     /// Points on an axis.

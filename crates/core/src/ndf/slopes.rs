@@ -28,13 +28,13 @@ pub struct Slopes {
 }
 
 impl Slopes {
-    /// Diffuse facets of displaced surfaces are averaged over `n` × `n` slopes, 2 to 128.
+    /// Diffuse facets of displaced surfaces are averaged over `n` × `n` slopes, 5 to 128.
     ///
     /// # Panics
     /// For another `n`.
     #[must_use]
     pub fn new(n: usize) -> Self {
-        assert!((2..=128).contains(&n), "a grid has 2 to 128 slopes on a side");
+        assert!((5..=128).contains(&n), "a grid has 5 to 128 slopes on a side");
         Self { grid: SlopeGrid::new(n) }
     }
 }
@@ -54,8 +54,8 @@ pub(super) const ROW: Row = Row {
     parse: |words| match words {
         [] => Ok(Box::new(Slopes::default())),
         [n] => match n.parse() {
-            Ok(n @ 2..=128) => Ok(Box::new(Slopes::new(n))),
-            _ => Err(format!("`{n}` is no number of slopes from 2 to 128")),
+            Ok(n @ 5..=128) => Ok(Box::new(Slopes::new(n))),
+            _ => Err(format!("`{n}` is no number of slopes from 5 to 128")),
         },
         _ => Err("takes one number at most".to_owned()),
     },

@@ -63,11 +63,15 @@ impl Surface for BakedSurface {
     }
 
     fn read_row(&self, y: usize, row: &mut SurfaceRow) {
+        row.spread.clear();
         for x in 0..self.size().width {
             let channels = self.pyramid.texel(0, x, y);
             let channels = &channels[..4 * self.method.layers()];
             row.height[x] = match self.method.describe(channels) {
-                Decoded::Slopes { height, .. } => height as f32,
+                Decoded::Slopes { height, covariance, .. } => {
+                    row.spread.push(covariance.map(|c| c as f32));
+                    height as f32
+                }
                 _ => 0.0,
             };
             let mean = self.method.mean_normal(channels);

@@ -166,8 +166,8 @@ impl Scene {
             let Size { width, height } = material.surface.size();
             let on = |o: &&mut Object| o.material == index;
             let meshes = self.objects.iter().filter(|o| o.material == index).map(|o| &*o.mesh);
-            let depth = scale * relief::natural_depth(meshes, height as f64 / width as f64);
-            let relief = Relief::new(&*material.surface, depth);
+            let width = relief::texture_width(meshes, height as f64 / width as f64);
+            let relief = Relief::new(&*material.surface, width, scale);
             for object in self.objects.iter_mut().filter(on) {
                 object.mesh = object.mesh.with_relief(&relief).into();
             }

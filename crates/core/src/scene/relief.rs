@@ -21,6 +21,8 @@ use crate::surface::{Surface, SurfaceRow};
 pub struct Relief {
     /// Heights in texture widths, in the first channel.
     pub heights: Arc<Lookup>,
+    /// World length of a texture width on the mesh, in the mean.
+    pub width: f64,
     /// World length of a height of one texture width.
     pub depth: f64,
     /// World length of a height, and of none, at most.
@@ -28,9 +30,10 @@ pub struct Relief {
 }
 
 impl Relief {
-    /// The heights of a surface.
+    /// The heights of a surface that lies on a mesh at `width` a texture width, `scale` times as high as keeps their slopes.
     #[must_use]
-    pub fn new(surface: &dyn Surface, depth: f64) -> Self {
+    pub fn new(surface: &dyn Surface, width: f64, scale: f64) -> Self {
+        let depth = scale * width;
         let mut row = SurfaceRow::flat(surface.size().width);
         let heights = Grid::from_fn(surface.size(), |x, y| {
             if x == 0 {
@@ -40,15 +43,15 @@ impl Relief {
         });
         let highest = heights.texels().iter().fold(0.0_f32, |most, h| most.max(h[0].abs()));
         let heights = Arc::new(Lookup::of_values(&heights, surface.wraps()));
-        Self { heights, depth, reach: f64::from(highest) * depth.abs() }
+        Self { heights, width, depth, reach: f64::from(highest) * depth.abs() }
     }
 
-    /// World height at a place of the map, of the level that a length of `width` in the world asks for.
+    /// World height at a place of the map, of the level that a length of `over` in the world asks for.
     #[must_use]
-    pub fn height(&self, uv: DVec2, width: f64) -> f64 {
+    pub fn height(&self, uv: DVec2, over: f64) -> f64 {
         let mut sums = [0.0; 4];
-        let texel = self.depth.abs() / self.heights_size().width as f64;
-        self.heights.trilinear(Tap { uv, lod: (width / texel).max(1.0).log2() }, 1.0, &mut sums);
+        let texel = self.width / self.heights_size().width as f64;
+        self.heights.trilinear(Tap { uv, lod: (over / texel).max(1.0).log2() }, 1.0, &mut sums);
         f64::from(sums[0]) * self.depth
     }
 
@@ -76,7 +79,7 @@ impl Relief {
 }
 
 /// World length of a texture width on meshes, in the mean over their area; rows over columns are `aspect`.
-pub(super) fn natural_depth<'a>(meshes: impl Iterator<Item = &'a Mesh>, aspect: f64) -> f64 {
+pub(super) fn texture_width<'a>(meshes: impl Iterator<Item = &'a Mesh>, aspect: f64) -> f64 {
     let (mut world, mut map) = (0.0, 0.0);
     for mesh in meshes {
         for t in &mesh.triangles {
@@ -93,9 +96,7 @@ impl Mesh {
     /// The mesh in triangles small enough for a relief to be tessellated in, with how slopes lie on it at each vertex.
     #[must_use]
     pub fn with_relief(&self, relief: &Relief) -> Self {
-        let mut mesh = split(self);
-        mesh.stretches = mesh.slope_maps(relief);
-        mesh
+        split(&Self { stretches: self.slope_maps(relief), ..self.clone() })
     }
 
     /// How slopes of the map lie on the surface, at each vertex: from the mean of the triangles around, by area.
@@ -129,10 +130,9 @@ impl Mesh {
         }
         let of = |(sum, weight): (DMat2, f64)| {
             let mean = sum * (1.0 / weight.max(f64::MIN_POSITIVE));
-            let natural = relief.depth.abs();
             // Where the map is crushed to a line, as at a pole, there is no telling: it lies evenly there.
-            if mean.determinant().abs() < 1e-6 * natural * natural {
-                return Mat2::IDENTITY;
+            if mean.determinant().abs() < 1e-6 * relief.width * relief.width {
+                return Mat2::IDENTITY * (relief.depth / relief.width) as f32;
             }
             (mean.transpose().inverse() * relief.depth).as_mat2()
         };

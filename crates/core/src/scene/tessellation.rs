@@ -2,7 +2,8 @@
 //!
 //! Each triangle of the base mesh is a patch: a grid of `segments` on a side, a power of two. How many is up to its longest edge as seen; an
 //! edge that needs fewer has its points moved together, so that patches on both sides of it have the same, and there are no cracks. What
-//! an edge needs, and how high a point is, depends on nothing but themselves and the eye. Planning takes a pass over the base mesh; the
+//! an edge needs, and how high a point is, depends on nothing but themselves and the eye. (Where vertices at one place have different normals or
+//! lie on different parts of the map, at hard edges and seams, displacement tears the mesh.) Planning takes a pass over the base mesh; the
 //! points are worked out here ([`expand`]), or by the twin in `tessellation.wgsl`.
 
 use glam::{DVec2, DVec3, Mat2, Vec2, Vec3};
@@ -20,6 +21,9 @@ pub const HEIGHT_PIXELS: f64 = 2.0;
 
 /// Most segments on a side of a patch.
 const MOST_SEGMENTS: u32 = 512;
+
+/// Most triangles of a plan, but for those of the base mesh.
+const MOST_TRIANGLES: u64 = 1 << 24;
 
 /// Segments along a texel at most: finer ones would show nothing more.
 const SEGMENTS_PER_TEXEL: f64 = 2.0;
@@ -126,10 +130,17 @@ pub fn plan(mesh: &Mesh, relief: &Relief, rays: &Rays, size: Size) -> Plan {
             .then(|| [0, 1, 2].map(|k| frustum.segments(&corners[k], &corners[(k + 1) % 3], relief)))
     };
     let all: Vec<Option<[u32; 3]>> = mesh.triangles.par_iter().map(edges).collect();
+    // Never more than memory has room for, be the eye ever so near: all edges alike are cut less finely.
+    let triangles = |coarser: u32| -> u64 {
+        let segments = |e: &[u32; 3]| u64::from((e[0].max(e[1]).max(e[2]) >> coarser).max(1));
+        all.iter().flatten().map(|e| segments(e).pow(2)).sum()
+    };
+    let coarser = (0..MOST_SEGMENTS.ilog2()).find(|c| triangles(*c) <= MOST_TRIANGLES);
+    let coarser = coarser.unwrap_or(MOST_SEGMENTS.ilog2());
     let mut plan = Plan::default();
     for (triangle, edges) in all.into_iter().enumerate() {
         if let Some(edges) = edges {
-            plan.push(triangle, edges);
+            plan.push(triangle, edges.map(|e| (e >> coarser).max(1)));
         }
     }
     plan
@@ -198,7 +209,7 @@ fn base_point(corners: &[Vertex; 3], [a, b, c]: [f32; 3]) -> Vertex {
     Vertex {
         position: mix(|v| v.position),
         normal: mix(|v| v.normal).normalize_or(p.normal),
-        tangent: mix(|v| v.tangent.truncate()).extend(p.tangent.w),
+        tangent: mix(|v| v.tangent.truncate()).normalize_or(p.tangent.truncate()).extend(p.tangent.w),
         uv,
     }
 }
@@ -239,7 +250,7 @@ fn grown(mesh: &Mesh, plan: &Plan, place: impl Fn(Vertex) -> Vertex + Sync) -> M
     Mesh { vertices, triangles, stretches }
 }
 
-/// Cuts triangles that reach over more than half a texture width, so that no patch need be cut finer near the eye than it can be.
+/// Cuts triangles that reach over more than a texture width, so that no patch need be cut finer near the eye than it can be.
 pub(super) fn split(mesh: &Mesh) -> Mesh {
     let longest = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|i| mesh.vertices[i as usize].uv);
@@ -256,7 +267,7 @@ pub(super) fn split(mesh: &Mesh) -> Mesh {
     }
     let mut plan = Plan::default();
     (0..mesh.triangles.len()).for_each(|t| plan.push(t, [segments; 3]));
-    Mesh { stretches: Vec::new(), ..grown(mesh, &plan, |v| v) }
+    grown(mesh, &plan, |v| v)
 }
 
 #[cfg(test)]

@@ -29,6 +29,11 @@ fn shade(place: Place, channels: ptr<function, Channels>, plain: Finish) -> vec3
     }
     for (var i = 0u; i < view.lights; i++) {
         let light = seen_from(place, i);
+        let across = light.wi + place.wo;
+        // A light right behind what is seen has no half-vector.
+        if dot(across, across) < 1e-12 {
+            continue;
+        }
         let way = way_between(light.wi, place.wo);
         if relief {
             let light_of = reflect_displaced(channels, &decoded, plain, material.reflection, way, place.stretch);

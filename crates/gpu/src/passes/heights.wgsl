@@ -21,7 +21,8 @@ struct Cut {
     first_triangle: u32,
     // The object's number, from 1.
     object: u32,
-    unused: u32,
+    // World length of a texture width on the mesh.
+    texture_width: f32,
 }
 
 struct Vertex {

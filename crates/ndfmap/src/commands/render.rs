@@ -83,8 +83,9 @@ pub(super) struct Render {
     /// A reflectance lobe in place of the materials' own; where a material has gloss of its own, that still widens it
     #[arg(long, value_parser = brdf_spelling)]
     brdf: Option<String>,
-    /// What goes with the lobe: the factor of Tan et al., of Han et al. or of Smith (tan, han, smith)
-    #[arg(long, value_parser = model)]
+    /// What goes with the lobe: the factor of Tan et al., of Han et al. or of Smith (tan, han, smith);
+    /// or what displaced surfaces have (masked, shadowed)
+    #[arg(long, value_parser = model, conflicts_with = "displace")]
     model: Option<Model>,
     #[command(flatten)]
     displace: DisplaceArguments,
@@ -128,9 +129,9 @@ pub(super) struct DisplaceArguments {
     /// Height maps displace what they lie on, by SCALE times what keeps their slopes; lobes become microfacets, and the truth is that of the
     /// displaced surface
     #[arg(long, value_name = "SCALE", num_args = 0..=1, default_missing_value = "1", value_parser = scale,
-        allow_negative_numbers = true, requires = "scene", conflicts_with = "model")]
+        allow_negative_numbers = true, requires = "scene")]
     displace: Option<f64>,
-    /// Facets of displaced surfaces shade each other
+    /// Facets of displaced surfaces shade each other. The truth has every shadow; methods, those that facets cast nearby
     #[arg(long, requires = "displace")]
     shadows: bool,
 }

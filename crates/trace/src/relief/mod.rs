@@ -1,4 +1,4 @@
-//! Displaced meshes as they are: every facet of the surface between the heights of their maps, and none of them in memory.
+//! Displaced meshes as they are: the facets of the surface between the heights of their maps, and none of them in memory.
 //!
 //! A triangle of the base mesh is cut into facets half a texel wide, displaced along its interpolated normals. What is in memory are boxes
 //! around groups of facets; a ray that enters one goes down to its facets by quarters, whose boxes come from the least and the greatest
@@ -29,7 +29,7 @@ const MOST_CUTS: u16 = 1 << 12;
 /// Facets along the side of a group, at least.
 const LEAST_GROUP: u16 = 4;
 
-/// Most groups: some 200 MB of boxes and hierarchy.
+/// Most groups, but for one a base triangle: some 200 MB of boxes and hierarchy.
 const MOST_GROUPS: usize = 1 << 21;
 
 /// Meshes of a scene that have relief, ready to be hit.

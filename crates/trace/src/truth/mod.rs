@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::light::Light;
 use ndfmap_core::metrics::{Picture, relative_l2};
 use ndfmap_core::reflection::{Finish, Model, Way};
 use ndfmap_core::scene::{Camera, Material, Rays, Scene};
@@ -232,25 +233,29 @@ impl<'a> Truth<'a> {
         let (tangent, bitangent) = facet.normal.any_orthonormal_pair();
         let frame = DMat3::from_cols(tangent, bitangent, facet.normal);
         let wo = frame.transpose() * eye;
-        let lit = ways(&self.scene.lights, (facet.position, frame), wo, Way::between);
-        let of = |(way, irradiance): (Way, DVec3)| {
-            if reflection.model == Model::Shadowed && self.in_shadow(facet, &way, frame) {
+        let of = |light: &Light| {
+            let (towards, irradiance) = light.seen_from(facet.position);
+            let Some(way) = Way::between(frame.transpose() * towards, wo) else { return DVec3::ZERO };
+            if reflection.model == Model::Shadowed && (way.wi.z <= 0.0 || self.in_shadow(facet, light)) {
                 return DVec3::ZERO;
             }
             irradiance * reflection.facet(DVec3::Z, &finish, &way)
         };
-        lit.map(of).sum()
+        self.scene.lights.iter().map(of).sum()
     }
 
-    /// True where something stands between a facet and the light of a way. Lights at a place are taken to be behind everything.
-    fn in_shadow(&self, facet: &Facet, way: &Way, frame: DMat3) -> bool {
-        if way.wi.z <= 0.0 {
-            return true;
-        }
+    /// True where something stands between a facet and a light.
+    fn in_shadow(&self, facet: &Facet, light: &Light) -> bool {
         let Some(relief) = self.relief else { return false };
-        let towards = frame * way.wi;
         let from = facet.position + facet.normal * (LIFT * relief.radius());
-        relief.hit(from, towards, f64::INFINITY).is_some() || self.geometry.hit(from, towards).is_some()
+        let (towards, _) = light.seen_from(from);
+        let reach = match light {
+            Light::Directional { .. } => f64::INFINITY,
+            Light::Point { at, .. } => at.distance(from),
+        };
+        let before = |distance: f64| distance < reach;
+        relief.hit(from, towards, reach).is_some()
+            || self.geometry.hit(from, towards).is_some_and(|hit| before(hit.distance))
     }
 
     /// Light that the texel `displaced` (in texels) from a place sends to the eye.
