@@ -60,7 +60,7 @@ struct Packet {
 
 /// Heights of a unit sphere whose slopes have these deviations eastward and northward, in units of the length `depth`.
 ///
-/// The map goes once around and from the north pole to the south pole. It is as fine as its size allows: a wave has [`WAVE`] texels.
+/// The map goes once around and from the north pole to the south pole. It is as fine as its size allows: a wave has twelve texels at the equator.
 #[must_use]
 pub fn sphere_noise(size: Size, deviations: DVec2, depth: f64, seed: u64) -> HeightField {
     // Of the longest wave vector, per radian; a packet is as wide as a wave is long.
