@@ -25,7 +25,7 @@ pub struct Relief {
     pub width: f64,
     /// World length of a height of one texture width.
     pub depth: f64,
-    /// World length of a height, and of none, at most.
+    /// How far the relief stands out or goes in, at most, in the world.
     pub reach: f64,
 }
 
