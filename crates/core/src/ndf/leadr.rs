@@ -269,7 +269,7 @@ mod tests {
 
     #[test]
     fn ggx_area_is_its_integral() {
-        // One axis: slopes seen along a plane have the density 2/(a π)... of Student's t of two degrees, c(s) = a²/(2 (a² + s²)^1.5).
+        // Slopes seen along a plane have the density a²/(2 (a² + s²)^1.5), Student's t of two degrees.
         let lobe = brdf::parse("ggx:0.5").unwrap();
         let deviation: f64 = 0.4;
         let a2 = 2.0 * deviation * deviation;

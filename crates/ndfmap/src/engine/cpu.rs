@@ -8,7 +8,7 @@ use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{Material, Scene};
 use ndfmap_trace::Geometry;
 use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
-use ndfmap_trace::truth::{Effort, TruePicture};
+use ndfmap_trace::truth::{Effort, TruePicture, Truth};
 use serde_json::{Value, json};
 
 use super::{Drawn, Engine, TrueGeometry, View};
@@ -45,6 +45,9 @@ impl Engine for Cpu {
         effort: &Effort,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<TruePicture, Failure> {
+        if !view.scene.has_relief() {
+            return Ok(Truth::new(view.scene, view.set).render(&view.camera, view.size, effort, progress));
+        }
         let true_geometry = TrueGeometry::new(view.scene);
         Ok(true_geometry.truth(view.scene).render(&view.camera, view.size, effort, progress))
     }
