@@ -11,7 +11,7 @@ use crate::GpuError;
 pub const DRAW: &str = include_str!("passes/draw.wgsl");
 
 /// What draw passes share: the camera, the lights, the triangles.
-const SCENE: &str = include_str!("passes/scene.wgsl");
+const SCENE: &str = concat!(include_str!("passes/vertices.wgsl"), "\n", include_str!("passes/scene.wgsl"));
 
 /// What passes that shade know of a material.
 const MATERIAL: &str = include_str!("passes/material.wgsl");

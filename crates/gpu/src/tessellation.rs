@@ -17,7 +17,8 @@ use crate::{Device, GpuError};
 const TWIN: &str = include_str!("../../core/src/scene/tessellation.wgsl");
 
 /// What both passes share.
-const HEIGHTS: &str = include_str!("passes/heights.wgsl");
+const HEIGHTS: &str =
+    concat!(include_str!("passes/vertices.wgsl"), "\n", include_str!("passes/heights.wgsl"));
 
 /// `Cut` in `heights.wgsl`.
 #[derive(Clone, Copy, Pod, Zeroable)]

@@ -60,7 +60,7 @@ pub struct Place {
 }
 
 impl Geometry {
-    /// Builds the hierarchy. Meshes with relief are taken as they are without.
+    /// Builds the hierarchy. Meshes with relief are not displaced; their places still say how slopes lie on them, as bump maps want.
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
         Self::of(scene, &scene.objects)

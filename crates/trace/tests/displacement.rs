@@ -165,17 +165,17 @@ fn lights(wi: DVec3) -> Vec<Light> {
     (0..37).map(light).collect()
 }
 
-/// Relative L2 error of LEADR over all ways, diffuse and specular, for slopes of these deviations.
-fn errors(deviations: DVec2, surfaces: u64, rays: usize) -> [f64; 2] {
+/// Relative L2 error of LEADR over all ways, diffuse and with this specular lobe, for slopes of these deviations.
+fn errors(deviations: DVec2, lobe: &str, surfaces: u64, rays: usize) -> [f64; 2] {
     let method = ndf::parse("slopes:9").unwrap();
     let mut all = [vec![(0.0, 0.0); ways().len()], vec![(0.0, 0.0); ways().len()]];
     for seed in 0..surfaces {
-        let reflection = || Reflection { lobe: brdf::parse("beckmann:0.1").unwrap(), model: Model::Masked };
+        let reflection = || Reflection { lobe: brdf::parse(lobe).unwrap(), model: Model::Masked };
         let mut scene = plane(Arc::new(gaussian(deviations, seed)), reflection(), 0.0, &ways()[0]);
         scene.displace(1.0, false).unwrap();
         let channels = coarsest(&*scene.materials[0].surface, &*method);
         let (geometry, relief) = (Geometry::without_relief(&scene), Relief::new(&scene));
-        for (lobe, pairs) in ["lambert", "beckmann:0.1"].into_iter().zip(&mut all) {
+        for (lobe, pairs) in ["lambert", lobe].into_iter().zip(&mut all) {
             let diffuse = if lobe == "lambert" { 1.0 } else { 0.0 };
             scene.materials[0].reflection.lobe = brdf::parse(lobe).unwrap();
             scene.materials[0].finish.diffuse = DVec3::splat(diffuse);
@@ -196,10 +196,10 @@ fn errors(deviations: DVec2, surfaces: u64, rays: usize) -> [f64; 2] {
 #[test]
 fn leadr_is_exact_on_gaussian_surfaces() {
     for deviations in [DVec2::splat(0.25), DVec2::new(0.5, 0.1)] {
-        let [diffuse, specular] = errors(deviations, 1, 2048);
+        let [diffuse, specular] = errors(deviations, "beckmann:0.1", 3, 4096);
         println!("{deviations}: diffuse {diffuse:.4}, specular {specular:.4}");
-        // Asked for; what is left is chance in few rays and in one surface.
-        assert!(diffuse < 0.03 && specular < 0.08, "{deviations}: {diffuse} {specular}");
+        // What the paper's "exact" is held to here. Chance leaves some 0.01 in three surfaces of 4096 rays a way.
+        assert!(diffuse < 0.03 && specular < 0.03, "{deviations}: {diffuse} {specular}");
     }
 }
 
@@ -207,9 +207,12 @@ fn leadr_is_exact_on_gaussian_surfaces() {
 #[ignore = "a table for the docs, minutes of rays"]
 fn leadr_on_gaussian_surfaces_of_many_deviations() {
     let isotropic = [0.1, 0.25, 0.5].map(DVec2::splat);
-    for deviations in isotropic.into_iter().chain([DVec2::new(0.25, 0.05), DVec2::new(0.5, 0.1)]) {
-        let [diffuse, specular] = errors(deviations, 6, 8192);
-        println!("{deviations}: diffuse {diffuse:.4}, specular {specular:.4}");
+    let grained = [DVec2::new(0.25, 0.05), DVec2::new(0.5, 0.1)];
+    let narrow = isotropic.into_iter().chain(grained).map(|deviations| (deviations, "beckmann:0.1"));
+    // A wide lobe, which LEADR adds in the frame of the mesh and facets have in their own.
+    for (deviations, lobe) in narrow.chain(isotropic.map(|deviations| (deviations, "beckmann:0.3"))) {
+        let [diffuse, specular] = errors(deviations, lobe, 6, 8192);
+        println!("{deviations} {lobe}: diffuse {diffuse:.4}, specular {specular:.4}");
     }
 }
 

@@ -1,11 +1,5 @@
 // Works out the triangles of meshes with relief from their points: one invocation for each. Twin of `triangle` in geometry.rs.
 
-struct Triangle {
-    face: vec4<f32>,
-    grad_u: vec4<f32>,
-    grad_v: vec4<f32>,
-}
-
 @group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
 @group(0) @binding(3) var<storage, read_write> corners: array<u32>;
 @group(0) @binding(4) var<storage, read_write> triangles: array<Triangle>;

@@ -25,17 +25,6 @@ struct Cut {
     texture_width: f32,
 }
 
-struct Vertex {
-    // Position relative to the scene's middle, and uv.x.
-    position_u: vec4<f32>,
-    // Unit normal, and uv.y.
-    normal_v: vec4<f32>,
-    // Unit tangent, and the sign of the bitangent.
-    tangent: vec4<f32>,
-    // How slopes of the map lie on the surface, by columns.
-    stretch: vec4<f32>,
-}
-
 @group(0) @binding(0) var<uniform> cut: Cut;
 @group(0) @binding(1) var<storage, read> patches: array<Patch>;
 

@@ -27,25 +27,6 @@ struct View {
     brightest: f32,
 }
 
-struct Vertex {
-    // Position relative to the scene's middle, and uv.x.
-    position_u: vec4<f32>,
-    // Unit normal, and uv.y.
-    normal_v: vec4<f32>,
-    // Unit tangent, and the sign of the bitangent.
-    tangent: vec4<f32>,
-    // With relief, how slopes of the map lie on the surface, by columns.
-    stretch: vec4<f32>,
-}
-
-struct Triangle {
-    // Unit normal, and the object.
-    face: vec4<f32>,
-    // How u and v change with the place; the first has a 1 on a mesh with relief.
-    grad_u: vec4<f32>,
-    grad_v: vec4<f32>,
-}
-
 struct Light {
     // Unit vector to the light (w = 0), or where it is (w = 1).
     place: vec4<f32>,

@@ -253,9 +253,8 @@ impl<'a> Truth<'a> {
             Light::Directional { .. } => f64::INFINITY,
             Light::Point { at, .. } => at.distance(from),
         };
-        let before = |distance: f64| distance < reach;
         relief.hit(from, towards, reach).is_some()
-            || self.geometry.hit(from, towards).is_some_and(|hit| before(hit.distance))
+            || self.geometry.hit(from, towards).is_some_and(|hit| hit.distance < reach)
     }
 
     /// Light that the texel `displaced` (in texels) from a place sends to the eye.
