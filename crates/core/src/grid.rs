@@ -55,6 +55,12 @@ impl<T> Grid<T> {
         (texels.len() == size.area()).then_some(Self { size, texels })
     }
 
+    /// A row, to be changed.
+    pub fn row_mut(&mut self, y: usize) -> &mut [T] {
+        let width = self.size.width;
+        &mut self.texels[y * width..][..width]
+    }
+
     /// Width and height.
     pub fn size(&self) -> Size {
         self.size

@@ -7,6 +7,7 @@
 use std::f64::consts::PI;
 
 use super::{Argument, Brdf, Row, number};
+use crate::light::environment::Kernel;
 use crate::units::{Alpha, SlopeVariance};
 
 /// A GGX distribution of microfacets.
@@ -79,6 +80,10 @@ impl Brdf for Ggx {
         let root = (mean * mean + spread).sqrt();
         // The smaller of the two terms apart, lest they cancel.
         if mean < 0.0 { spread / (root - mean) / 2.0 } else { (mean + root) / 2.0 }
+    }
+
+    fn kernel(&self) -> Kernel {
+        Kernel::Ggx
     }
 
     fn microfacets(&self) -> Option<super::Beckmann> {

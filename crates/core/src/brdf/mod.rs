@@ -20,6 +20,9 @@ pub use torrance_sparrow::TorranceSparrow;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::fmt::Debug;
 
+use glam::DVec3;
+
+use crate::light::environment::Kernel;
 use crate::sphere::{gauss_legendre, legendre};
 use crate::units::SlopeVariance;
 
@@ -59,6 +62,16 @@ pub trait Brdf: Send + Sync + Debug {
     /// `width` wide; Beckmann's, where a lobe has none of its own.
     fn masking(&self, u: f64, width: SlopeVariance) -> f64 {
         beckmann::masking(u, width)
+    }
+
+    /// Colour of the lobe itself, at the cosine u = wi·wh; white, but for what was measured.
+    fn tint(&self, _u: f64) -> DVec3 {
+        DVec3::ONE
+    }
+
+    /// The microfacets whose blur of an environment is most like this lobe's.
+    fn kernel(&self) -> Kernel {
+        Kernel::Beckmann
     }
 
     /// The microfacets of a lobe that is none: Beckmann's, as wide as it; `None` for lobes of microfacets, and for Lambert.

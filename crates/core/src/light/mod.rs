@@ -1,4 +1,9 @@
-//! Lights without extent.
+//! Lights without extent; and, in [`environment`], light from everywhere.
+
+pub mod environment;
+mod split_sum;
+
+pub use split_sum::{ENTRIES, Reflected, SplitSum};
 
 use glam::DVec3;
 

@@ -1,0 +1,151 @@
+//! Light over half-vectors: Han et al. 2007, section 8, equation 26. Twin: `half_vectors.wgsl`.
+//!
+//! For one view, a lobe around the half-vector meets `L'(wh) = L(wi(wh, wo)) 4 (wi·wh)`, and what an effective lobe reflects of it is again a
+//! sum over spherical harmonics, `Σ Lambda_l rho_l L'_lm Y_lm(mu)`. The views are precomputed on a grid of 16 × 16 directions, in the
+//! environment's own frame, and shading is interpolated between four: so both the eye and the light may turn from frame to frame.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::Environment;
+use crate::sphere::{sh_count, spherical_harmonics};
+
+/// Highest order, the paper's.
+pub const HALF_VECTOR_ORDER: usize = 8;
+
+/// Views on each axis: around the zenith, and from it down.
+pub const VIEWS: usize = 16;
+
+const COUNT: usize = sh_count(HALF_VECTOR_ORDER);
+
+/// Texels that light is taken from, around: 2.8 degrees each, where order 8 tells 22 apart.
+const TEXELS: usize = 128;
+
+/// Light over half-vectors, for every view of the grid.
+#[derive(Clone, Debug)]
+pub struct HalfVectors {
+    /// RGB of every coefficient, of one view after the other, each row of views at one angle to the zenith.
+    coefficients: Vec<DVec3>,
+}
+
+impl HalfVectors {
+    /// Projects an environment. An integral over half-vectors is one over the light's directions, whose solid angle is `4 (wi·wh)` times
+    /// as large, so texels count by their own.
+    #[must_use]
+    pub fn of(environment: &Environment) -> Self {
+        let few = environment.reduced(TEXELS);
+        let (width, height) = (few.size().width, few.size().height);
+        let mut light = Vec::with_capacity(width * height);
+        for y in 0..height {
+            for x in 0..width {
+                let towards = few.direction(x as f64 + 0.5, y as f64 + 0.5);
+                light.push((towards, few.picture().row(y)[x].as_dvec3() * few.solid_angle(y)));
+            }
+        }
+        let view = |i: usize| {
+            let wo = view_direction(i % VIEWS, i / VIEWS);
+            let (mut sums, mut basis) = (vec![DVec3::ZERO; COUNT], [0.0; COUNT]);
+            for (wi, power) in &light {
+                // Light from right behind has no half-vector.
+                let Some(wh) = (*wi + wo).try_normalize() else { continue };
+                spherical_harmonics(HALF_VECTOR_ORDER, wh, &mut basis);
+                sums.iter_mut().zip(&basis).for_each(|(sum, b)| *sum += *power * *b);
+            }
+            sums
+        };
+        let views: Vec<Vec<DVec3>> = (0..VIEWS * VIEWS).into_par_iter().map(view).collect();
+        Self { coefficients: views.concat() }
+    }
+
+    /// All coefficients, view after view.
+    #[must_use]
+    pub fn coefficients(&self) -> &[DVec3] {
+        &self.coefficients
+    }
+
+    /// `Σ zonal_l L'_lm Y_lm(mu)` for an eye in a direction: between the four views around it. What rings below zero is held there.
+    #[must_use]
+    pub fn evaluate(&self, wo: DVec3, mu: DVec3, zonal: &[f64; HALF_VECTOR_ORDER + 1]) -> DVec3 {
+        let mut basis = [0.0; COUNT];
+        spherical_harmonics(HALF_VECTOR_ORDER, mu, &mut basis);
+        for (l, scale) in zonal.iter().enumerate() {
+            basis[l * l..(l + 1) * (l + 1)].iter_mut().for_each(|b| *b *= scale);
+        }
+        let sum = |view: usize| -> DVec3 {
+            self.coefficients[view * COUNT..][..COUNT].iter().zip(&basis).map(|(c, b)| *c * *b).sum()
+        };
+        let (views, part) = views_around(wo);
+        let [a, b, c, d] = views.map(sum);
+        a.lerp(b, part.x).lerp(c.lerp(d, part.x), part.y).max(DVec3::ZERO)
+    }
+}
+
+/// A view of the grid: `i` around the zenith, `j` from the zenith (0) to the nadir.
+fn view_direction(i: usize, j: usize) -> DVec3 {
+    let (sin_phi, cos_phi) = (TAU * i as f64 / VIEWS as f64).sin_cos();
+    let (sin, cos) = (PI * j as f64 / (VIEWS - 1) as f64).sin_cos();
+    DVec3::new(sin * sin_phi, cos, -sin * cos_phi)
+}
+
+/// The four views around a direction, and where between them it is.
+fn views_around(wo: DVec3) -> ([usize; 4], DVec2) {
+    let around = wo.x.atan2(-wo.z).rem_euclid(TAU) / TAU * VIEWS as f64;
+    let down = wo.y.clamp(-1.0, 1.0).acos() / PI * (VIEWS - 1) as f64;
+    let (i, j) = (around as usize % VIEWS, (down as usize).min(VIEWS - 2));
+    let next = (i + 1) % VIEWS;
+    let part = DVec2::new(around - around.floor(), down - j as f64);
+    ([j * VIEWS + i, j * VIEWS + next, (j + 1) * VIEWS + i, (j + 1) * VIEWS + next], part)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{smooth, smooth_radiance};
+    use super::*;
+    use crate::brdf;
+    use crate::grid::Size;
+    use crate::sphere::gauss_legendre;
+
+    #[test]
+    fn a_wide_lobe_reflects_the_integral() {
+        let e = smooth(Size { width: 256, height: 128 });
+        let table = HalfVectors::of(&e);
+        let lobe = brdf::parse("blinn-phong:12").unwrap();
+        let zonal: [f64; HALF_VECTOR_ORDER + 1] = std::array::from_fn(|l| lobe.zonal(HALF_VECTOR_ORDER)[l]);
+        for j in [3, 7, 11] {
+            // On a view of the grid, so that nothing is interpolated.
+            let wo = view_direction(5, j);
+            let mu = (wo + DVec3::new(0.1, 0.3, -0.2)).normalize();
+            let (mut expected, nodes) = (DVec3::ZERO, gauss_legendre(200));
+            for (z, weight) in &nodes {
+                for k in 0..400 {
+                    let (s, c) = (TAU * f64::from(k) / 400.0).sin_cos();
+                    let r = (1.0 - z * z).sqrt();
+                    let wi = DVec3::new(r * c, r * s, *z);
+                    let f = lobe.evaluate((wi + wo).normalize().dot(mu));
+                    expected += smooth_radiance(wi) * (f * weight * TAU / 400.0);
+                }
+            }
+            let got = table.evaluate(wo, mu, &zonal);
+            // Orders above 8 of this lobe against a light that ends at the horizon of half-vectors: 2 %.
+            assert!((got - expected).length() < 0.02 * expected.length(), "{got} {expected}");
+        }
+    }
+
+    #[test]
+    fn views_are_interpolated_without_a_seam() {
+        for wo in [DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::new(-1e-12, 0.0, -1.0), DVec3::new(0.6, 0.0, 0.8)]
+        {
+            let (views, part) = views_around(wo);
+            assert!(views.iter().all(|v| *v < VIEWS * VIEWS), "{wo}");
+            assert!((0.0..=1.0).contains(&part.x) && (0.0..=1.0).contains(&part.y), "{wo} {part}");
+        }
+        let (views, part) = views_around(view_direction(3, 4));
+        assert!(
+            views[0] == 4 * VIEWS + 3 && part.length() < 1e-9
+                || views[0] == 4 * VIEWS + 2
+                || views[0] == 3 * VIEWS + 3
+        );
+    }
+}

@@ -1,0 +1,237 @@
+//! What a lobe reflects of light that is the same from everywhere: the half of shading that knows of no environment.
+//!
+//! Karis 2013 parts the integral over an environment in two: the mean radiance that a lobe sees, and what it reflects of a white sky. Here
+//! the second is that of our own shading under lights, for any lobe and model: the integral over all directions of the light of what
+//! `reflect` (`ndf/reflect.rs`) gives for one lobe of normals, factors at the normals that answer included. A table over the cosine between
+//! the lobe's mean and the eye, and over the spread of its normals.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::brdf::Brdf;
+use crate::light::environment::{HALF_VECTOR_ORDER, Kernel};
+use crate::reflection::{Model, Reflection, Way};
+use crate::sphere::gauss_legendre;
+use crate::units::SlopeVariance;
+
+/// Entries of the table on each axis: cosines from 0 to 1, and spreads from 0 to 1, evenly in their root.
+pub const ENTRIES: usize = 16;
+
+/// Least cosine that the table is made for.
+const LEAST_COSINE: f64 = 1e-3;
+
+/// What is reflected of a white sky.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reflected {
+    /// Times the specular colour, and what the lobe's own colour makes of it.
+    pub scale: DVec3,
+    /// Whatever the specular colour is.
+    pub bias: f64,
+    /// The lobe alone, without factor or colour: what [`Self`]'s light is a mean by.
+    pub lobe: f64,
+    /// The mean of Fresnel's rise over the diffuse part.
+    pub rise: f64,
+}
+
+impl Reflected {
+    fn mix(self, other: Self, part: f64) -> Self {
+        let mix = |a: f64, b: f64| a + (b - a) * part;
+        Self {
+            scale: self.scale.lerp(other.scale, part),
+            bias: mix(self.bias, other.bias),
+            lobe: mix(self.lobe, other.lobe),
+            rise: mix(self.rise, other.rise),
+        }
+    }
+}
+
+/// The table of a material's lobe and model.
+#[derive(Clone, Debug)]
+pub struct SplitSum {
+    /// One spread after the other, each for every cosine.
+    entries: Vec<Reflected>,
+    /// Zonal coefficients of the lobe, to the order that half-vectors have.
+    pub zonal: [f64; HALF_VECTOR_ORDER + 1],
+    /// The cubes that its highlights look up.
+    pub kernel: Kernel,
+}
+
+impl SplitSum {
+    /// Works the table out.
+    #[must_use]
+    pub fn new(reflection: &Reflection) -> Self {
+        let coefficients = reflection.lobe.zonal(HALF_VECTOR_ORDER);
+        let entry = |i: usize| {
+            let spread = ((i / ENTRIES) as f64 / (ENTRIES - 1) as f64).powi(2);
+            let cosine = ((i % ENTRIES) as f64 / (ENTRIES - 1) as f64).max(LEAST_COSINE);
+            reflected(reflection, cosine, SlopeVariance::clamped(spread))
+        };
+        Self {
+            entries: (0..ENTRIES * ENTRIES).into_par_iter().map(entry).collect(),
+            zonal: std::array::from_fn(|l| coefficients[l]),
+            kernel: reflection.lobe.kernel(),
+        }
+    }
+
+    /// What normals of this spread reflect to an eye at this cosine to their mean.
+    #[must_use]
+    pub fn lookup(&self, cosine: f64, spread: SlopeVariance) -> Reflected {
+        let last = (ENTRIES - 1) as f64;
+        let (x, y) = (cosine.clamp(0.0, 1.0) * last, spread.get().clamp(0.0, 1.0).sqrt() * last);
+        let (i, j) = ((x as usize).min(ENTRIES - 2), (y as usize).min(ENTRIES - 2));
+        let row = |j: usize| {
+            let at = j * ENTRIES + i;
+            self.entries[at].mix(self.entries[at + 1], x - i as f64)
+        };
+        row(j).mix(row(j + 1), y - j as f64)
+    }
+
+    /// The table as shaders take it, two texels an entry: scale and bias; lobe, rise, and two spare. Two rows more hold the zonal
+    /// coefficients, from the left.
+    #[must_use]
+    pub fn texels(&self) -> Vec<[f32; 4]> {
+        let of = |e: &Reflected| {
+            let [r, g, b] = e.scale.to_array();
+            [[r, g, b, e.bias], [e.lobe, e.rise, 0.0, 0.0]].map(|texel| texel.map(|v| v as f32))
+        };
+        let mut texels: Vec<[f32; 4]> = self.entries.iter().flat_map(of).collect();
+        let zonal = |l: usize| [self.zonal.get(l).copied().unwrap_or(0.0) as f32, 0.0, 0.0, 0.0];
+        texels.extend((0..2 * ENTRIES).map(zonal));
+        texels
+    }
+}
+
+/// Rings and spokes of half-vectors around the lobe's mean.
+const RINGS: usize = 32;
+const SPOKES: usize = 32;
+
+fn reflected(reflection: &Reflection, cosine: f64, spread: SlopeVariance) -> Reflected {
+    let wo = DVec3::new((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine);
+    let mut sum = Reflected { rise: rise(wo), ..Reflected::default() };
+    if !reflection.is_specular() {
+        return sum;
+    }
+    let base = reflection.width(SlopeVariance::ZERO);
+    // Half-vectors as GGX facets have them: it has weight wherever a lobe of this width has some.
+    let alpha_squared = 2.0 * base.widen(spread).get();
+    let share = |ring: usize| (ring as f64 + 0.5) / RINGS as f64;
+    for ring in 0..RINGS {
+        // A warp of the shares to both ends, so that peak and tail have rings of their own: 3t² - 2t³, with its slope.
+        let t = share(ring);
+        let (warped, slope) = (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t));
+        let tan_squared = Kernel::Ggx.quantile(alpha_squared, warped);
+        let z = (1.0 + tan_squared).sqrt().recip();
+        let density = Kernel::Ggx.facets(alpha_squared, tan_squared) * z;
+        let solid_angle = slope / (density * (RINGS * SPOKES) as f64);
+        let r = (1.0 - z * z).max(0.0).sqrt();
+        // The same on both sides of the plane of incidence.
+        for spoke in 0..SPOKES {
+            let (y, x) = (TAU * (spoke as f64 + 0.5) / SPOKES as f64).sin_cos();
+            let wh = DVec3::new(r * x, r * y, z);
+            let u = wh.dot(wo);
+            if u <= 0.0 {
+                continue;
+            }
+            let way = Way { wi: 2.0 * u * wh - wo, wo, wh, u };
+            // Directions of the light are 4 u as many.
+            let lobe = reflection.lobe.evaluate_widened(spread, z) * 4.0 * u * solid_angle;
+            let n = (DVec3::Z * base.get() + wh * spread.get()).try_normalize().unwrap_or(DVec3::Z);
+            let answered = lobe * reflection.factor(n, &way, SlopeVariance::ZERO);
+            let tint = reflection.lobe.tint(u);
+            let dark = reflection.model.fresnel(DVec3::ZERO, u).x;
+            sum.lobe += lobe;
+            sum.scale += tint * (answered * (reflection.model.fresnel(DVec3::ONE, u).x - dark));
+            sum.bias += answered * dark;
+        }
+    }
+    sum
+}
+
+/// Mean of Schlick's `(1 - u)^5` over the light of a diffuse facet that faces up.
+fn rise(wo: DVec3) -> f64 {
+    let mut sum = 0.0;
+    for (node, weight) in gauss_legendre(16) {
+        let theta = FRAC_PI_2 * (node + 1.0) / 2.0;
+        let (sin, cos) = theta.sin_cos();
+        for spoke in 0..16 {
+            let (y, x) = (TAU * (f64::from(spoke) + 0.5) / 16.0).sin_cos();
+            let wi = DVec3::new(sin * x, sin * y, cos);
+            let u = ((1.0 + wi.dot(wo)) / 2.0).max(0.0).sqrt();
+            sum += (1.0 - u).powi(5) * cos * sin * weight * FRAC_PI_2 / 2.0 * TAU / 16.0;
+        }
+    }
+    sum / PI
+}
+
+impl Reflected {
+    /// What is left for the diffuse part of a material of this specular colour.
+    #[must_use]
+    pub fn diffuse_share(&self, model: Model, specular: DVec3) -> DVec3 {
+        match model {
+            Model::Han => DVec3::ONE,
+            _ => DVec3::ONE - specular - (DVec3::ONE - specular) * self.rise,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf;
+
+    fn table(lobe: &str, model: Model) -> SplitSum {
+        SplitSum::new(&Reflection { lobe: brdf::parse(lobe).unwrap(), model })
+    }
+
+    #[test]
+    fn a_smooth_mirror_reflects_all_and_a_rough_one_less() {
+        // Without Fresnel (specular 1), microfacets that hide each other and nothing else send back what they see: 1, for masking alone,
+        // but for light from below, which the normal's own hemisphere ends: none at alpha 0.05 seen straight on.
+        let masked = table("ggx:0.05", Model::Masked);
+        let straight = masked.lookup(1.0, SlopeVariance::ZERO);
+        assert!((straight.scale.x + straight.bias - 1.0).abs() < 0.01, "{straight:?}");
+        // Walter et al.'s single scattering of GGX at alpha 1, seen straight on: 0.45 (Heitz et al. 2016 show the loss, figure 3, as over half).
+        let rough = table("ggx:1", Model::Smith).lookup(1.0, SlopeVariance::ZERO);
+        assert!(rough.scale.x + rough.bias < 0.75, "{rough:?}");
+        assert!(rough.scale.x + rough.bias > 0.3, "{rough:?}");
+    }
+
+    #[test]
+    fn tables_are_the_integral() {
+        // Against plain quadrature over the light's directions of what shading gives for them.
+        for (lobe, model) in [
+            ("blinn-phong:20", Model::Han),
+            ("beckmann:0.4", Model::Smith),
+            ("ggx:0.3", Model::Shadowed),
+            ("ggx:0.5", Model::Tan),
+        ] {
+            let reflection = Reflection { lobe: brdf::parse(lobe).unwrap(), model };
+            let spread = SlopeVariance::clamped((3.0_f64 / 15.0).powi(2));
+            let cosine = 12.0 / 15.0;
+            let got = SplitSum::new(&reflection).lookup(cosine, spread);
+            let wo = DVec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine);
+            let base = reflection.width(SlopeVariance::ZERO);
+            let (mut scale, mut bias, mut lobe_sum) = (0.0, 0.0, 0.0);
+            for (z, weight) in gauss_legendre(400) {
+                for k in 0..400 {
+                    let (y, x) = (TAU * f64::from(k) / 400.0).sin_cos();
+                    let r = (1.0 - z * z).sqrt();
+                    let Some(way) = Way::between(DVec3::new(r * x, r * y, z), wo) else { continue };
+                    let lobe = reflection.lobe.evaluate_widened(spread, way.wh.z) * weight * TAU / 400.0;
+                    let n = (DVec3::Z * base.get() + way.wh * spread.get()).normalize();
+                    let answered = lobe * reflection.factor(n, &way, SlopeVariance::ZERO);
+                    let dark = reflection.model.fresnel(DVec3::ZERO, way.u).x;
+                    lobe_sum += lobe;
+                    scale += answered * (reflection.model.fresnel(DVec3::ONE, way.u).x - dark);
+                    bias += answered * dark;
+                }
+            }
+            // Thirty-two rings of a smooth function, cut at the horizon of half-vectors.
+            assert!((got.lobe / lobe_sum - 1.0).abs() < 0.005, "{lobe}: {} {lobe_sum}", got.lobe);
+            assert!((got.scale.x / scale - 1.0).abs() < 0.01, "{lobe}: {} {scale}", got.scale.x);
+            assert!((got.bias - bias).abs() < 0.01 * scale, "{lobe}: {} {bias}", got.bias);
+        }
+    }
+}
