@@ -128,6 +128,12 @@ impl Reflection {
         self.lobe.slope_variance().unwrap_or(SlopeVariance::ZERO).widen(gloss)
     }
 
+    /// Colour of the highlight at `u = wi·wh`: Fresnel's term, and the lobe's own.
+    #[must_use]
+    pub fn fresnel(&self, specular: DVec3, u: f64) -> DVec3 {
+        self.lobe.tint(u) * self.model.fresnel(specular, u)
+    }
+
     /// False for a lobe of the light's direction, which is the diffuse part already.
     #[must_use]
     pub fn is_specular(&self) -> bool {
@@ -174,7 +180,7 @@ impl Reflection {
         if lobe == 0.0 {
             return diffuse;
         }
-        diffuse + fresnel * (lobe * self.factor(n, way, finish.gloss))
+        diffuse + self.lobe.tint(way.u) * fresnel * (lobe * self.factor(n, way, finish.gloss))
     }
 }
 

@@ -6,6 +6,7 @@
 
 pub mod atomic;
 pub mod attribute;
+pub mod environment;
 mod error;
 pub mod formats;
 mod header;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use ndfmap_core::grid::Size;
 use ndfmap_core::light::Light;
+use ndfmap_core::light::environment::Surroundings;
 use ndfmap_core::reflection::Model;
 use ndfmap_core::scene::{self, Camera, Scene, Staging};
 use ndfmap_core::surface::Surface;
@@ -32,6 +33,16 @@ pub(crate) struct Stage {
     pub(crate) exposure: Option<f64>,
     /// Let heights displace meshes.
     pub(crate) displacement: Option<Displacement>,
+    /// Light from everywhere, in place of the scene's own lights.
+    pub(crate) environment: Option<TurningEnvironment>,
+}
+
+/// An environment that turns as time goes.
+#[derive(Clone)]
+pub(crate) struct TurningEnvironment {
+    pub(crate) surroundings: Surroundings,
+    /// In radians, at time 0 and at time 1.
+    pub(crate) turn: [f64; 2],
 }
 
 /// How heights displace meshes.
@@ -51,9 +62,10 @@ pub(crate) struct CameraArgument {
 }
 
 impl Stage {
-    /// True for a scene that depends on time; models do not.
+    /// True for a scene that depends on time; models do not, but their light may.
     pub(crate) fn moves(&self) -> bool {
         scene::find(&self.scene).is_some()
+            || self.environment.as_ref().is_some_and(|e| e.turn[0] != e.turn[1])
     }
 
     /// The scene at a time.
@@ -93,8 +105,12 @@ impl Stage {
             let degrees = camera.degrees.unwrap_or(scene.camera.degrees);
             scene.camera = Camera::new(camera.eye.into(), camera.target.into(), degrees);
         }
-        if !self.lights.is_empty() {
+        if !self.lights.is_empty() || self.environment.is_some() {
             scene.lights.clone_from(&self.lights);
+        }
+        if let Some(TurningEnvironment { surroundings, turn: [from, to] }) = &self.environment {
+            let turn = from + (to - from) * time;
+            scene.surroundings = Some(Surroundings { turn, ..surroundings.clone() });
         }
         if let Some(exposure) = self.exposure {
             scene.exposure = exposure as f32;

@@ -50,6 +50,7 @@ fn plane(surface: Arc<dyn Surface>, reflection: Reflection, diffuse: f64, way: &
             reflection,
         }],
         lights: vec![Light::Directional { towards: way.wi, irradiance: DVec3::ONE }],
+        surroundings: None,
         background: Vec3::ZERO,
         exposure: 1.0,
     }

@@ -50,6 +50,7 @@ fn plate(surface: Arc<dyn Surface>, lobe: &str, model: Model, distance: f64) -> 
             towards: DVec3::new(0.3, 0.2, 0.9).normalize(),
             irradiance: DVec3::ONE,
         }],
+        surroundings: None,
         background: Vec3::ZERO,
         exposure: 1.0,
     }

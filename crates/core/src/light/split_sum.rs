@@ -10,7 +10,6 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::brdf::Brdf;
 use crate::light::environment::{HALF_VECTOR_ORDER, Kernel};
 use crate::reflection::{Model, Reflection, Way};
 use crate::sphere::gauss_legendre;

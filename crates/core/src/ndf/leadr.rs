@@ -87,12 +87,57 @@ impl SlopeGaussian {
         let n = (mean - wo * (ARTIFICIAL_TURN * mean.dot(wo))).try_normalize().unwrap_or(wo);
         (n, n.dot(wo).max(LEAST_VISIBLE))
     }
+
+    /// The same with its weight among slopes that weigh one together.
+    pub(super) fn artificial(&self, wo: DVec3) -> (DVec3, f64) {
+        let (n, seen) = self.artificial_normal(wo);
+        (n, ARTIFICIAL_WEIGHT * seen)
+    }
+
+    /// Calls `each` for every slope of a grid, laid out in this distribution.
+    pub(super) fn samples(&self, grid: &SlopeGrid, mut each: impl FnMut(SlopeSample)) {
+        let [xx, yy, xy] = self.covariance;
+        let deviation = xx.sqrt();
+        let shear = if deviation > 0.0 { xy / deviation } else { 0.0 };
+        let rest = (yy - shear * shear).max(0.0).sqrt();
+        for i in 0..grid.n * grid.n {
+            let (at, weight, step) = grid.point(i);
+            let slope = self.mean + DVec2::new(deviation * at.x, shear * at.x + rest * at.y);
+            each(SlopeSample { leaning: (-slope).extend(1.0), weight, square: at.length_squared(), step });
+        }
+    }
+
+    /// The level of a cube of this side at which a facet that mirrors is looked up: as wide as the solid angle of directions that its
+    /// share of slopes mirrors to (section 3.5, in its form and with its constants).
+    pub(super) fn level(&self, grid: &SlopeGrid, sample: &SlopeSample, u: f64, side: usize) -> f64 {
+        let [xx, yy, _] = self.covariance;
+        let z = sample.leaning.length().recip();
+        let jacobian = 4.0 * u * z.powi(3);
+        0.72 * jacobian.ln() + grid.level_offset() + (sample.step * xx.max(yy).sqrt() * side as f64).log2()
+    }
 }
 
-/// A grid of N × N slopes, evenly spaced in deviations (section 3.4): 0.9 apart for five, and from -3 to 3 for more.
+/// A slope that stands for some of a Gaussian.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SlopeSample {
+    /// Its normal over the normal's z: minus the slope, and one.
+    pub(super) leaning: DVec3,
+    /// Its weight; all of them add up to one.
+    pub(super) weight: f64,
+    /// Squared distance from the mean, in deviations.
+    pub(super) square: f64,
+    /// Side of the square of slopes that it stands for, in deviations.
+    pub(super) step: f64,
+}
+
+/// N × N slopes: a grid evenly spaced in deviations (section 3.4), 0.9 apart for five, and from -3 to 3 for more; or drawn at random, each as
+/// likely as the distribution says, to compare (Figure 5).
 #[derive(Clone, Debug, PartialEq)]
 pub struct SlopeGrid {
-    /// Positions in deviations, and weights that sum to one.
+    n: usize,
+    /// Drawn at random.
+    drawn: bool,
+    /// Positions on an axis in deviations, and weights that sum to one.
     points: Vec<(f64, f64)>,
 }
 
@@ -103,7 +148,12 @@ impl SlopeGrid {
         let at = |i: usize| (i as f64 - (n - 1) as f64 / 2.0) * step;
         let weight = |p: f64| (-0.5 * p * p).exp();
         let total: f64 = (0..n).map(|i| weight(at(i))).sum();
-        Self { points: (0..n).map(|i| (at(i), weight(at(i)) / total)).collect() }
+        Self { n, drawn: false, points: (0..n).map(|i| (at(i), weight(at(i)) / total)).collect() }
+    }
+
+    /// As many slopes drawn at random, always the same.
+    pub(super) fn drawn(n: usize) -> Self {
+        Self { drawn: true, ..Self::new(n) }
     }
 
     /// What is between two points.
@@ -113,8 +163,47 @@ impl SlopeGrid {
 
     /// Points on an axis.
     pub(super) fn len(&self) -> usize {
-        self.points.len()
+        self.n
     }
+
+    /// True for slopes drawn at random.
+    pub(super) fn is_drawn(&self) -> bool {
+        self.drawn
+    }
+
+    /// A point in deviations, its weight, and the side of the square that it stands for.
+    fn point(&self, i: usize) -> (DVec2, f64, f64) {
+        if !self.drawn {
+            let ((p, weight_p), (q, weight_q)) = (self.points[i / self.n], self.points[i % self.n]);
+            return (DVec2::new(p, q), weight_p * weight_q, Self::step(self.n));
+        }
+        let [u, v] = [2 * i, 2 * i + 1].map(|k| (f64::from(hash(k as u32) >> 8) + 0.5) / f64::from(1 << 24));
+        let radius = (-2.0 * u.ln()).sqrt();
+        let (sin, cos) = (std::f64::consts::TAU * v).sin_cos();
+        let share = 1.0 / (self.n * self.n) as f64;
+        // One over the density there, shared out.
+        let step = (std::f64::consts::TAU / u * share).sqrt();
+        (DVec2::new(radius * cos, radius * sin), share, step)
+    }
+
+    /// What is added to the level, by how many slopes there are (section 3.5): wider than their solid angle where they are few, lest
+    /// there be bands. Between the paper's three, evenly in the logarithm; drawn ones as they are.
+    pub(super) fn level_offset(&self) -> f64 {
+        const OFFSETS: [(f64, f64); 3] = [(5.0, 0.5), (32.0, -0.5), (128.0, -1.48)];
+        if self.drawn {
+            return OFFSETS[2].1;
+        }
+        let n = self.n as f64;
+        let [a, b] = if n < 32.0 { [OFFSETS[0], OFFSETS[1]] } else { [OFFSETS[1], OFFSETS[2]] };
+        a.1 + (b.1 - a.1) * (n / a.0).ln() / (b.0 / a.0).ln()
+    }
+}
+
+/// A number that is as good as random for each other number (the permuted congruential generator of O'Neill 2014, as a hash).
+fn hash(v: u32) -> u32 {
+    let state = v.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
+    (word >> 22) ^ word
 }
 
 /// Light from specular facets along a way, per unit of irradiance, Fresnel's term apart. `spread` holds the lobe's own width already.
@@ -128,8 +217,7 @@ fn specular(reflection: &Reflection, spread: &SlopeGaussian, texel: &FilteredTex
         return lit / (spread.projected_area(way.wo) * (1.0 + spread.lambda_rational(way.wo) + shadow));
     }
     let Some(shadow) = shadow(reflection, spread, way) else { return 0.0 };
-    let (n, seen) = spread.artificial_normal(way.wo);
-    let seen = ARTIFICIAL_WEIGHT * seen;
+    let (n, seen) = spread.artificial(way.wo);
     let facet = reflection.lobe.evaluate_widened(gloss, n.dot(way.wh)) * reflection.factor(n, way, gloss);
     (lit + seen * facet) / (spread.visible_area(lobe, way.wo) + seen + shadow)
 }
@@ -146,23 +234,13 @@ fn shadow(reflection: &Reflection, spread: &SlopeGaussian, way: &Way) -> Option<
 /// Light from diffuse facets along a way, per unit of irradiance, times pi over their albedo.
 fn diffuse(reflection: &Reflection, g: &SlopeGaussian, grid: &SlopeGrid, way: &Way) -> f64 {
     let Some(shadow) = shadow(reflection, g, way) else { return 0.0 };
-    let [xx, yy, xy] = g.covariance;
-    let deviation = xx.sqrt();
-    let shear = if deviation > 0.0 { xy / deviation } else { 0.0 };
-    let rest = (yy - shear * shear).max(0.0).sqrt();
     let (mut lit, mut seen) = (0.0, 0.0);
-    for (p, weight_p) in &grid.points {
-        for (q, weight_q) in &grid.points {
-            let slope = g.mean + DVec2::new(deviation * p, shear * p + rest * q);
-            // n / n.z
-            let n = (-slope).extend(1.0);
-            let visible = weight_p * weight_q * n.dot(way.wo).max(0.0);
-            seen += visible;
-            lit += visible * n.dot(way.wi).max(0.0) / n.length();
-        }
-    }
-    let (n, visible) = g.artificial_normal(way.wo);
-    let visible = ARTIFICIAL_WEIGHT * visible;
+    g.samples(grid, |SlopeSample { leaning, weight, .. }| {
+        let visible = weight * leaning.dot(way.wo).max(0.0);
+        seen += visible;
+        lit += visible * leaning.dot(way.wi).max(0.0) / leaning.length();
+    });
+    let (n, visible) = g.artificial(way.wo);
     (lit + visible * n.dot(way.wi).max(0.0)) / (seen + visible + shadow)
 }
 

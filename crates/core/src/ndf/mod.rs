@@ -7,6 +7,7 @@
 //! run time. [`TABLE`] has one row for each; a row buys the conformance suite in `conformance.rs`.
 //! Notation: `docs/notation.md`.
 
+mod environment;
 mod fixed;
 mod gmm;
 mod leadr;
@@ -23,6 +24,7 @@ mod vmf;
 #[cfg(test)]
 mod conformance;
 
+pub use environment::Surround;
 pub use fixed::Fixed;
 pub use gmm::{GaussianMixture, Gmm};
 pub use leadr::SlopeGrid;
@@ -303,6 +305,14 @@ pub trait Method: Debug + Send + Sync {
     /// The light that a texel with these filtered channels sends to the eye; see [`FilteredTexel`].
     fn reflect(&self, texel: &FilteredTexel<'_>, reflection: &Reflection, lights: &[Lit]) -> DVec3;
 
+    /// The light that it sends to the eye of an environment, but for its small bright sources.
+    fn reflect_environment(
+        &self,
+        texel: &FilteredTexel<'_>,
+        reflection: &Reflection,
+        surround: &Surround<'_>,
+    ) -> DVec3;
+
     /// What shading wants to know of a material whose gloss goes from `least` to `most`, as shaders take it: entry by entry, at the eleven
     /// glosses `least + (k/10)² (most - least)`, and then of the diffuse lobe.
     fn shader_table(
@@ -383,6 +393,15 @@ impl<R: Representation> Method for R {
 
     fn reflect(&self, texel: &FilteredTexel<'_>, reflection: &Reflection, lights: &[Lit]) -> DVec3 {
         reflect::reflect(self, texel, reflection, lights)
+    }
+
+    fn reflect_environment(
+        &self,
+        texel: &FilteredTexel<'_>,
+        reflection: &Reflection,
+        surround: &Surround<'_>,
+    ) -> DVec3 {
+        environment::reflect(self, texel, reflection, surround)
     }
 
     fn shader_table(

@@ -112,7 +112,7 @@ pub(super) fn reflect<R: Representation + ?Sized>(
 }
 
 /// Mean direction of a lobe's normals that send light along the half-vector.
-fn answering(lobe: &Shaded, mu: DVec3, base: SlopeVariance, wh: DVec3) -> DVec3 {
+pub(super) fn answering(lobe: &Shaded, mu: DVec3, base: SlopeVariance, wh: DVec3) -> DVec3 {
     (mu * base.get() + wh * lobe.variance.get()).try_normalize().unwrap_or(mu)
 }
 
@@ -128,7 +128,8 @@ pub(super) fn together(
         return diffuse;
     }
     let fresnel = reflection.model.fresnel(finish.specular, way.u);
-    fresnel * specular.max(0.0) + reflection.model.diffuse_share(fresnel) * diffuse
+    reflection.lobe.tint(way.u) * fresnel * specular.max(0.0)
+        + reflection.model.diffuse_share(fresnel) * diffuse
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ use crate::units::SlopeVariance;
 /// Moments of the slope.
 #[derive(Clone, Debug)]
 pub struct Slopes {
-    /// Slopes over which diffuse facets of a displaced surface are averaged.
+    /// Slopes over which environments and diffuse facets of a displaced surface are averaged.
     grid: SlopeGrid,
 }
 
@@ -48,8 +48,8 @@ impl Default for Slopes {
 
 pub(super) const ROW: Row = Row {
     name: "slopes",
-    parameters: "[:N]",
-    summary: "one anisotropic Gaussian of slopes, with the mean height; N × N of them for displaced diffuse facets (5)",
+    parameters: "[:N[:drawn]]",
+    summary: "one anisotropic Gaussian of slopes, with the mean height; N × N of them (5) under environments and for displaced diffuse facets",
     paper: "Olano and Baker 2010 (LEAN); Dupuy et al. 2013 (LEADR)",
     parse: |words| match words {
         [] => Ok(Box::new(Slopes::default())),
@@ -57,9 +57,13 @@ pub(super) const ROW: Row = Row {
             Ok(n @ 5..=128) => Ok(Box::new(Slopes::new(n))),
             _ => Err(format!("`{n}` is no number of slopes from 5 to 128")),
         },
-        _ => Err("takes one number at most".to_owned()),
+        [n, "drawn"] => match n.parse() {
+            Ok(n @ 5..=128) => Ok(Box::new(Slopes { grid: SlopeGrid::drawn(n) })),
+            _ => Err(format!("`{n}` is no number of slopes from 5 to 128")),
+        },
+        _ => Err("takes one number at most, and perhaps `drawn`".to_owned()),
     },
-    samples: &["slopes", "slopes:9"],
+    samples: &["slopes", "slopes:9", "slopes:9:drawn"],
 };
 
 /// What is stored: means of height, slope and products of slopes.
@@ -171,9 +175,10 @@ impl Representation for Slopes {
     type Lobes = SlopeGaussian;
 
     fn spelling(&self) -> String {
-        match self.grid.len() {
-            5 => ROW.name.to_owned(),
-            n => format!("{}:{n}", ROW.name),
+        match (self.grid.len(), self.grid.is_drawn()) {
+            (5, false) => ROW.name.to_owned(),
+            (n, false) => format!("{}:{n}", ROW.name),
+            (n, true) => format!("{}:{n}:drawn", ROW.name),
         }
     }
 
@@ -249,6 +254,8 @@ impl Representation for Slopes {
         ])
         .constant("GRID", self.grid.len() as u32)
         .constant("GRID_STEP", SlopeGrid::step(self.grid.len()) as f32)
+        .constant("GRID_LEVEL", self.grid.level_offset() as f32)
+        .constant("GRID_DRAWN", self.grid.is_drawn())
         .displaces()
     }
 

@@ -50,6 +50,7 @@ pub(super) const ROW: Row = Row {
                 reflection: reflection(Model::Tan, "torrance-sparrow:0.1"),
             }],
             lights: vec![sun([0.6, 0.7, 0.8], [1.2, 1.15, 1.0]), sun([-0.8, 0.2, 0.4], [0.4, 0.45, 0.6])],
+            surroundings: None,
             background: Vec3::new(0.02, 0.02, 0.025),
             exposure: 1.0,
         }

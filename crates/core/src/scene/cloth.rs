@@ -141,6 +141,7 @@ pub(super) const ROW: Row = Row {
                 material("ball", staging.builtin("noise"), finish([0.2, 0.2, 0.22], 0.03), "blinn-phong:40"),
             ],
             lights: vec![sun([-0.5, 0.9, 0.7], [2.6, 2.5, 2.4]), sun([0.9, 0.3, 0.2], [0.5, 0.55, 0.7])],
+            surroundings: None,
             background: Vec3::new(0.02, 0.02, 0.025),
             exposure: 1.0,
         }

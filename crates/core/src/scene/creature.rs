@@ -151,6 +151,7 @@ pub(super) const ROW: Row = Row {
                 ),
             ],
             lights: vec![sun([0.5, 0.9, 0.75], [2.6, 2.45, 2.2]), sun([-0.7, 0.45, 0.25], [0.6, 0.75, 1.0])],
+            surroundings: None,
             background: Vec3::new(0.3, 0.42, 0.58),
             exposure: 1.0,
         }

@@ -50,6 +50,7 @@ pub(super) const ROW: Row = Row {
                 reflection: reflection(Model::Tan, "torrance-sparrow:0.2"),
             }],
             lights: vec![sun([-1.0, 0.42, -0.35], [3.2, 2.7, 2.1]), sun([0.3, 1.0, 0.3], [0.35, 0.45, 0.65])],
+            surroundings: None,
             background: Vec3::new(0.25, 0.4, 0.62),
             exposure: 1.0,
         }

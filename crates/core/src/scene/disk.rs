@@ -42,6 +42,7 @@ fn scene(staging: &Staging, camera: Camera) -> Scene {
             reflection: reflection(Model::Tan, "torrance-sparrow:0.08"),
         }],
         lights: vec![sun([-0.5, 0.6, 0.9], [1.0, 0.97, 0.9]), sun([0.7, 0.1, 0.6], [0.35, 0.4, 0.5])],
+        surroundings: None,
         background: Vec3::new(0.012, 0.013, 0.016),
         exposure: 1.0,
     }

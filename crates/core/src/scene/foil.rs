@@ -32,6 +32,7 @@ pub(super) const ROW: Row = Row {
                 reflection: reflection(Model::Smith, "ggx:0.12"),
             }],
             lights: vec![sun([-0.4, 0.7, 1.0], [2.6, 2.5, 2.3]), sun([0.9, 0.2, 0.5], [0.7, 0.8, 1.0])],
+            surroundings: None,
             background: Vec3::new(0.015, 0.015, 0.02),
             exposure: 1.0,
         }

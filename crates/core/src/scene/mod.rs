@@ -33,6 +33,7 @@ use glam::{DVec3, Vec3};
 use crate::brdf::{self, Argument, Brdf};
 use crate::grid::Size;
 use crate::light::Light;
+use crate::light::environment::Surroundings;
 use crate::procedural;
 use crate::reflection::{Model, Reflection};
 use crate::surface::Surface;
@@ -56,6 +57,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// What it is lit by.
     pub lights: Vec<Light>,
+    /// Light from everywhere. It reaches every normal from all directions that face it: what is below the base surface does, too.
+    pub surroundings: Option<Surroundings>,
     /// Radiance where nothing is hit, linear RGB.
     pub background: Vec3,
     /// Display values are sRGB of radiance times this.

@@ -44,6 +44,7 @@ fn build(staging: &Staging, grain: Grain) -> Scene {
             reflection: reflection(Model::Masked, "beckmann:0.15"),
         }],
         lights: vec![sun([0.0, 0.0, 1.0], [3.0, 3.0, 3.0])],
+        surroundings: None,
         background: Vec3::ZERO,
         exposure: 1.0,
     }

@@ -29,6 +29,7 @@ fn build(staging: &Staging) -> Scene {
             reflection: reflection(Model::Smith, "beckmann:0.15"),
         }],
         lights: vec![sun([0.1, 0.45, -1.0], [1.6, 1.5, 1.35])],
+        surroundings: None,
         background: Vec3::new(0.02, 0.03, 0.05),
         exposure: 1.0,
     }

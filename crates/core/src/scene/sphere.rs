@@ -37,6 +37,7 @@ pub(super) const ROW: Row = Row {
                 reflection: reflection(Model::Han, "blinn-phong:100"),
             }],
             lights: vec![sun([0.5, 0.8, 0.9], [2.5, 2.4, 2.3]), sun([-0.9, 0.1, 0.3], [0.5, 0.6, 0.9])],
+            surroundings: None,
             background: Vec3::new(0.015, 0.017, 0.02),
             exposure: 1.0,
         }

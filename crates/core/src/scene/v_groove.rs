@@ -28,6 +28,7 @@ pub(super) const ROW: Row = Row {
                 reflection: reflection(Model::Han, "blinn-phong:60"),
             }],
             lights: vec![sun([3.0 * staging.time - 1.5, 0.2, 1.0], [1.0, 1.0, 1.0])],
+            surroundings: None,
             background: Vec3::splat(0.01),
             exposure: 1.0,
         }

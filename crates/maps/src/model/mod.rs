@@ -152,6 +152,7 @@ fn scene_of(
         objects,
         materials: parts.materials,
         lights: vec![sun([0.5, 0.8, 0.9], [2.8, 2.7, 2.5]), sun([-0.9, 0.3, 0.4], [0.7, 0.8, 1.0])],
+        surroundings: None,
         background: Vec3::new(0.02, 0.022, 0.026),
         exposure: 1.0,
     };

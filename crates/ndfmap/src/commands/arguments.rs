@@ -1,16 +1,22 @@
 //! Arguments that several commands take, and how they are read.
 
+use std::path::PathBuf;
+
 use clap::{Args, ValueEnum};
 use ndfmap_core::brdf::{self, ParseBrdfError};
 use ndfmap_core::grid::Size;
+use ndfmap_core::light::environment::{Surroundings, Technique, builtin};
 use ndfmap_core::ndf::{self, Method, ParseMethodError};
 use ndfmap_core::pyramid;
 use ndfmap_core::reflection::Model;
 use ndfmap_core::scene;
 use ndfmap_core::surface::{SlopeFilter, Wrap, Wraps};
 use ndfmap_maps::SourceKind;
+use ndfmap_maps::environment::read_environment;
 use ndfmap_maps::model::is_model;
 use ndfmap_maps::source::{Convention, DEFAULT_HEIGHT_SCALE, SourceOptions};
+
+use crate::staging::TurningEnvironment;
 
 /// How to take the source map.
 #[derive(Debug, Args)]
@@ -105,6 +111,71 @@ impl std::convert::From<Precision> for pyramid::Precision {
             Precision::Single => Self::Single,
         }
     }
+}
+
+/// Light from everywhere.
+#[derive(Debug, Args)]
+pub(super) struct EnvironmentArguments {
+    /// Light the scene by an environment in place of its own lights: a float picture (.hdr, .exr) by latitude and longitude or of a cube,
+    /// or `builtin:NAME`
+    #[arg(long, value_name = "FILE", requires = "scene")]
+    environment: Option<PathBuf>,
+    /// Turn the environment around the vertical, in degrees; with two numbers, from one to the other as time goes from 0 to 1
+    #[arg(long, value_name = "DEGREES[,TO]", value_parser = turn, allow_hyphen_values = true, requires = "environment")]
+    turn: Option<[f64; 2]>,
+    /// How highlights look the environment up: cubes that microfacets have blurred (prefiltered), or Han et al.'s series over
+    /// half-vectors (harmonics)
+    #[arg(long, value_name = "HOW", default_value = "prefiltered", value_parser = technique, requires = "environment")]
+    environment_light: Technique,
+}
+
+impl EnvironmentArguments {
+    /// Reads and prepares it.
+    pub(super) fn read(&self) -> Result<Option<TurningEnvironment>, crate::Failure> {
+        let Some(path) = &self.environment else { return Ok(None) };
+        let (environment, warnings) = read_environment(path)?;
+        warnings.iter().for_each(|w| super::warn(path, w));
+        let surroundings =
+            Surroundings { technique: self.environment_light, ..Surroundings::new(environment) };
+        let suns = &surroundings.filtered.suns;
+        if !suns.lights.is_empty() {
+            let (count, percent) = (suns.lights.len(), 100.0 * suns.share);
+            let name = path.display();
+            eprintln!(
+                "ndfmap: {name}: {count} small bright source(s), {percent:.1} % of its light, shine as lights of their own"
+            );
+        }
+        Ok(Some(TurningEnvironment {
+            surroundings,
+            turn: self.turn.unwrap_or_default().map(f64::to_radians),
+        }))
+    }
+}
+
+fn turn(text: &str) -> Result<[f64; 2], String> {
+    let degrees = |t: &str| match t.parse::<f64>() {
+        Ok(v) if v.abs() <= 1e6 => Ok(v),
+        _ => Err(format!("`{t}` is no number of degrees")),
+    };
+    match text.split(',').collect::<Vec<_>>()[..] {
+        [one] => Ok([degrees(one)?; 2]),
+        [from, to] => Ok([degrees(from)?, degrees(to)?]),
+        _ => Err("one number of degrees, or two".to_owned()),
+    }
+}
+
+fn technique(text: &str) -> Result<Technique, String> {
+    let names = Technique::ALL.map(Technique::name).join(", ");
+    Technique::ALL
+        .into_iter()
+        .find(|t| t.name() == text)
+        .ok_or_else(|| format!("`{text}` is none of {names}"))
+}
+
+/// Every built-in environment, for `--help`.
+pub(super) fn environments_help() -> String {
+    let rows = builtin::TABLE.iter().map(|r| format!("  {:12} {}", r.name, r.summary));
+    format!("Built-in environments (`builtin:NAME`):\n{}", rows.collect::<Vec<_>>().join("\n"))
 }
 
 pub(super) fn positive(text: &str) -> Result<f64, String> {

@@ -13,8 +13,8 @@ use ndfmap_trace::filtered::Lookups;
 use ndfmap_trace::truth::Effort;
 
 use super::arguments::{
-    BuiltinSize, Precision, SourceArguments, brdf_spelling, brdfs_help, method, method_spelling,
-    methods_help, scene_name, size,
+    BuiltinSize, EnvironmentArguments, Precision, SourceArguments, brdf_spelling, brdfs_help, method,
+    method_spelling, methods_help, scene_name, size,
 };
 use super::render::{DisplaceArguments, FilterArguments, check_drift};
 use super::{print, print_json, say_if_replaced, warn};
@@ -66,6 +66,8 @@ pub(super) struct Compare {
     #[command(flatten)]
     displace: DisplaceArguments,
     #[command(flatten)]
+    environment: EnvironmentArguments,
+    #[command(flatten)]
     filter: FilterArguments,
     #[command(flatten)]
     source: SourceArguments,
@@ -90,6 +92,7 @@ impl Compare {
         for warning in &map.warnings {
             warn(&self.map, warning);
         }
+        let environment = self.environment.read()?;
         let run = Run {
             map: &map,
             methods: &methods,
@@ -102,6 +105,7 @@ impl Compare {
                     map: Some(Arc::clone(&map.surface)),
                     brdf: Some(self.brdf.clone()),
                     displacement: self.displace.displacement(),
+                    environment: environment.clone(),
                     ..Stage::default()
                 },
                 times: vec![0.0],

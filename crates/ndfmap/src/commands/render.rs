@@ -22,8 +22,8 @@ use ndfmap_trace::truth::Effort;
 use serde_json::json;
 
 use super::arguments::{
-    Precision, SourceArguments, brdf_spelling, brdfs_help, method, method_spelling, methods_help, model,
-    positive, scene_name, size,
+    EnvironmentArguments, Precision, SourceArguments, brdf_spelling, brdfs_help, environments_help, method,
+    method_spelling, methods_help, model, positive, scene_name, size,
 };
 use super::{print, print_json, say_if_replaced, warn};
 use crate::Failure;
@@ -36,7 +36,7 @@ use crate::staging::{CameraArgument, Displacement, Stage};
 
 /// Render a scene through baked maps, and by brute force to compare
 #[derive(Debug, Args)]
-#[command(after_long_help = format!("{}\n\n{}\n\n{}", scenes_help(), methods_help(), brdfs_help()))]
+#[command(after_long_help = [scenes_help(), methods_help(), brdfs_help(), environments_help()].join("\n\n"))]
 pub(super) struct Render {
     /// A built-in scene, or a model: .gltf, .glb, .obj or .ply
     #[arg(long, value_name = "NAME|FILE", value_parser = scene_name)]
@@ -89,6 +89,8 @@ pub(super) struct Render {
     model: Option<Model>,
     #[command(flatten)]
     displace: DisplaceArguments,
+    #[command(flatten)]
+    environment: EnvironmentArguments,
     /// Diffuse albedo R,G,B of the first material, in place of its own; its textures go
     #[arg(long, value_name = "R,G,B", value_parser = colour)]
     diffuse: Option<DVec3>,
@@ -457,6 +459,7 @@ impl Render {
             specular: self.specular,
             exposure: self.exposure,
             displacement: self.displace.displacement(),
+            environment: self.environment.read()?,
         })
     }
 

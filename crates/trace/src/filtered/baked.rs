@@ -2,7 +2,7 @@
 
 use glam::{DMat2, DVec3};
 use ndfmap_core::lookup::{Lookup, PixelFootprint, Texels};
-use ndfmap_core::ndf::{FilteredTexel, Lit, Method, Prepared};
+use ndfmap_core::ndf::{FilteredTexel, Lit, Method, Prepared, Surround};
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{BakedMaterial, FinishMap, Material};
 
@@ -24,6 +24,8 @@ pub(super) struct Shading<'a> {
     pub(super) prepared: &'a Prepared,
     /// On a displaced surface, how slopes of the map lie on it.
     pub(super) relief: Option<DMat2>,
+    /// In an environment, what is around the place.
+    pub(super) surround: Option<Surround<'a>>,
 }
 
 impl Baked {
@@ -102,6 +104,9 @@ impl Baked {
             at_means: lookups.at_means,
             relief: shading.relief,
         };
-        shading.method.reflect(&texel, &material.reflection, lights)
+        let (method, reflection) = (shading.method, &material.reflection);
+        let of_environment = |surround| method.reflect_environment(&texel, reflection, surround);
+        method.reflect(&texel, reflection, lights)
+            + shading.surround.as_ref().map_or(DVec3::ZERO, of_environment)
     }
 }

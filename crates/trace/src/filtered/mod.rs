@@ -7,11 +7,13 @@ mod baked;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DMat3, DVec2, DVec3, Vec3};
 use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::light::environment::Surroundings;
+use ndfmap_core::light::{Light, SplitSum};
 use ndfmap_core::lookup::{Filtering, PixelFootprint};
 use ndfmap_core::metrics::Picture;
-use ndfmap_core::ndf::{Lit, Method, Prepared};
+use ndfmap_core::ndf::{Lit, Method, Prepared, Surround};
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::reflection::Way;
 use ndfmap_core::scene::{Camera, Material, Rays, Scene};
@@ -90,6 +92,36 @@ struct How<'a> {
     lookups: Lookups,
     /// For each material.
     prepared: &'a [Prepared],
+    around: Option<&'a Around<'a>>,
+}
+
+/// An environment that a scene stands in, and what its materials make of it.
+struct Around<'a> {
+    surroundings: &'a Surroundings,
+    to_environment: DMat3,
+    suns: Vec<Light>,
+    /// For each material.
+    split_sums: Vec<SplitSum>,
+}
+
+impl<'a> Around<'a> {
+    fn new(surroundings: &'a Surroundings, materials: &[Material]) -> Self {
+        let split_sums: Vec<SplitSum> = materials.iter().map(|m| SplitSum::new(&m.reflection)).collect();
+        split_sums.iter().for_each(|s| surroundings.filtered.make(surroundings.technique, s.kernel));
+        let (to_environment, suns) = (surroundings.to_environment(), surroundings.suns());
+        Self { surroundings, to_environment, suns, split_sums }
+    }
+
+    /// What surrounds a place.
+    fn at(&self, place: &Place, wo: DVec3) -> Surround<'_> {
+        Surround {
+            light: &self.surroundings.filtered,
+            technique: self.surroundings.technique,
+            to_environment: self.to_environment * place.frame,
+            wo,
+            split_sum: &self.split_sums[place.material],
+        }
+    }
 }
 
 /// Room for a pixel's channels.
@@ -105,7 +137,8 @@ impl Filtered<'_> {
         let rays = camera.rays(size);
         let prepare = |m: &Material| self.maps.method.prepare(&m.reflection, m.finish.gloss);
         let prepared: Vec<Prepared> = self.scene.materials.iter().map(prepare).collect();
-        let how = How { lookups, prepared: &prepared };
+        let around = self.scene.surroundings.as_ref().map(|s| Around::new(s, &self.scene.materials));
+        let how = How { lookups, prepared: &prepared, around: around.as_ref() };
         let done = AtomicUsize::new(0);
         let band = |first: usize| {
             let band = self.band(&rays, size, first, how);
@@ -174,9 +207,16 @@ impl Filtered<'_> {
         scratch.lights.clear();
         let relief = place.stretch.filter(|_| self.maps.displaces);
         let between = if relief.is_some() { Way::between } else { Way::new };
-        let lit = ways(&self.scene.lights, (place.position, place.frame), wo, between);
-        scratch.lights.extend(lit.map(|(way, irradiance)| Lit { way, irradiance }));
-        if scratch.lights.is_empty() {
+        let of_scene = ways(&self.scene.lights, (place.position, place.frame), wo, between);
+        let lit = |(way, irradiance)| Lit { way, irradiance };
+        scratch.lights.extend(of_scene.map(lit));
+        let surround = how.around.map(|around| {
+            // Of an environment normals see what the base surface does not.
+            let suns = ways(&around.suns, (place.position, place.frame), wo, Way::between);
+            scratch.lights.extend(suns.map(lit));
+            around.at(place, wo)
+        });
+        if scratch.lights.is_empty() && surround.is_none() {
             return DVec3::ZERO;
         }
         let [dx, dy] = self.geometry.differentials(hit, place, rays, at);
@@ -186,6 +226,7 @@ impl Filtered<'_> {
             method: self.maps.method,
             prepared: &how.prepared[place.material],
             relief,
+            surround,
         };
         let Scratch { channels, lights } = scratch;
         self.maps.materials[place.material].shade(&shading, &pixel, how.lookups, (channels, lights))

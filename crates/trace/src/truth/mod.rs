@@ -3,7 +3,9 @@
 //! Each ray shades one texel of the finest level, without masking or shadowing, so that a pixel tends to the plain mean of
 //! the BRDF over what it covers. Between texels the map is the bilinear mix of what the texels *reflect*, as texture units
 //! filter level 0: a ray takes the texel under a point displaced by up to half a texel either way, which has that mean.
-//! Nothing here knows of `ndfmap_core::ndf`.
+//! Nothing here knows of `ndfmap_core::ndf`. An environment's light is sampled, by `environment.rs`.
+
+mod environment;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -18,6 +20,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
+use self::environment::{Shown, Sky};
 use crate::drift;
 use crate::geometry::{Geometry, Place};
 use crate::relief::{Facet, Relief};
@@ -83,6 +86,7 @@ pub struct Truth<'a> {
     /// What of the scene is displaced; the rest is in `geometry`.
     relief: Option<&'a Relief>,
     materials: Vec<Finest<'a>>,
+    sky: Option<Sky<'a>>,
 }
 
 impl<'a> Truth<'a> {
@@ -100,7 +104,8 @@ impl<'a> Truth<'a> {
             });
             Finest { material, normals, wraps: surface.wraps() }
         };
-        Self { scene, geometry, relief: None, materials: scene.materials.iter().map(finest).collect() }
+        let materials = scene.materials.iter().map(finest).collect();
+        Self { scene, geometry, relief: None, materials, sky: scene.surroundings.as_ref().map(Sky::new) }
     }
 
     /// The same of a displaced scene: the meshes that have relief by its facets, and by `geometry` those that have none.
@@ -214,11 +219,13 @@ impl<'a> Truth<'a> {
         if let Some(relief) = self.relief
             && let Some(hit) = relief.hit(rays.eye, direction, limit)
         {
-            return self.shade_facet(&relief.facet(&hit, direction), -direction, DVec2::new(s, t) - 0.5);
+            let facet = relief.facet(&hit, direction);
+            return self.shade_facet(&facet, -direction, (DVec2::new(s, t) - 0.5, random));
         }
         match plain {
             Some(hit) => {
-                self.shade(&self.geometry.place(&hit, direction, false), -direction, DVec2::new(s, t) - 0.5)
+                let place = self.geometry.place(&hit, direction, false);
+                self.shade(&place, -direction, (DVec2::new(s, t) - 0.5, random))
             }
             None => self.scene.background.as_dvec3(),
         }
@@ -226,7 +233,7 @@ impl<'a> Truth<'a> {
 
     /// Light that a facet of relief sends to the eye, made of what the texel `displaced` from it is. Where facets shade each other, a light
     /// that something stands before adds nothing.
-    fn shade_facet(&self, facet: &Facet, eye: DVec3, displaced: DVec2) -> DVec3 {
+    fn shade_facet(&self, facet: &Facet, eye: DVec3, (displaced, random): (DVec2, &mut Pcg64Mcg)) -> DVec3 {
         let finest = &self.materials[facet.material];
         let (x, y) = finest.texel(facet.uv, displaced);
         let (reflection, finish) = (&finest.material.reflection, finest.finish(x, y));
@@ -241,7 +248,15 @@ impl<'a> Truth<'a> {
             }
             irradiance * reflection.facet(DVec3::Z, &finish, &way)
         };
-        self.scene.lights.iter().map(of).sum()
+        let direct: DVec3 = self.scene.lights.iter().map(of).sum();
+        let shown = Shown { frame, wo, n: DVec3::Z, finish: &finish, reflection };
+        let shadows = reflection.model == Model::Shadowed;
+        let open = |wi: DVec3| {
+            // A light like any other, of which only the direction counts.
+            let light = || Light::Directional { towards: frame * wi, irradiance: DVec3::ONE };
+            !shadows || (wi.z > 0.0 && !self.in_shadow(facet, &light()))
+        };
+        direct + self.sky.as_ref().map_or(DVec3::ZERO, |sky| sky.light(&shown, open, random))
     }
 
     /// True where something stands between a facet and a light.
@@ -258,7 +273,7 @@ impl<'a> Truth<'a> {
     }
 
     /// Light that the texel `displaced` (in texels) from a place sends to the eye.
-    fn shade(&self, place: &Place, eye: DVec3, displaced: DVec2) -> DVec3 {
+    fn shade(&self, place: &Place, eye: DVec3, (displaced, random): (DVec2, &mut Pcg64Mcg)) -> DVec3 {
         let finest = &self.materials[place.material];
         let (x, y) = finest.texel(place.uv, displaced);
         let (material, finish) = (finest.material, finest.finish(x, y));
@@ -269,9 +284,12 @@ impl<'a> Truth<'a> {
             None => n.as_dvec3(),
         };
         let wo = place.frame.transpose() * eye;
-        ways(&self.scene.lights, (place.position, place.frame), wo, Way::new)
-            .map(|(way, irradiance)| irradiance * material.reflection.facet(n, &finish, &way))
-            .sum()
+        let reflection = &material.reflection;
+        let direct: DVec3 = ways(&self.scene.lights, (place.position, place.frame), wo, Way::new)
+            .map(|(way, irradiance)| irradiance * reflection.facet(n, &finish, &way))
+            .sum();
+        let shown = Shown { frame: place.frame, wo, n, finish: &finish, reflection };
+        direct + self.sky.as_ref().map_or(DVec3::ZERO, |sky| sky.light(&shown, |_| true, random))
     }
 }
 

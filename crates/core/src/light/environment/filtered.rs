@@ -78,6 +78,15 @@ impl FilteredEnvironment {
         made.get_or_init(|| kernel.filter(&self.radiance))
     }
 
+    /// Makes now what a technique wants of it. What is made when first asked for is made by all threads together, and must not be asked for
+    /// first from within what they already do together.
+    pub fn make(&self, technique: Technique, kernel: Kernel) {
+        match technique {
+            Technique::Prefiltered => drop(self.prefiltered(kernel)),
+            Technique::Harmonics => drop(self.half_vectors()),
+        }
+    }
+
     /// Light over half-vectors.
     #[must_use]
     pub fn half_vectors(&self) -> &HalfVectors {

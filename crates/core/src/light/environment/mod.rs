@@ -7,6 +7,7 @@
 //! (`sun.rs`), spherical harmonics (`harmonics.rs`), cubes that are filtered wider and wider (`cube.rs`, `prefilter.rs`), and Han et al.'s
 //! light over half-vectors (`half_vectors.rs`).
 
+pub mod builtin;
 mod cube;
 mod filtered;
 mod half_vectors;

@@ -1,0 +1,166 @@
+//! Environments: pictures of light from everywhere, by latitude and longitude or on the faces of a cube.
+
+use std::path::Path;
+
+use glam::{DVec2, DVec3, Vec3};
+use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::light::environment::{Environment, builtin, cube_direction};
+
+use crate::formats::{read_file, read_image};
+use crate::source::BUILTIN_PREFIX;
+use crate::{Image, MapError, Samples};
+
+/// Where the faces +x, -x, +y, -y, +z, -z are in a picture, in sides of a face, and whether the last is upside down.
+struct Layout {
+    /// Sides across and down.
+    sides: (usize, usize),
+    faces: [(usize, usize); 6],
+    last_turned: bool,
+}
+
+/// Pictures of a cube: crosses, and strips.
+const LAYOUTS: [Layout; 4] = [
+    Layout { sides: (4, 3), faces: [(2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (3, 1)], last_turned: false },
+    Layout { sides: (3, 4), faces: [(2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (1, 3)], last_turned: true },
+    Layout { sides: (6, 1), faces: [(0, 0), (1, 0), (2, 0), (3, 0), (4, 0), (5, 0)], last_turned: false },
+    Layout { sides: (1, 6), faces: [(0, 0), (0, 1), (0, 2), (0, 3), (0, 4), (0, 5)], last_turned: false },
+];
+
+/// Reads an environment, `builtin:NAME` or a file; with it, what was odd but could be lived with.
+///
+/// # Errors
+/// [`MapError`] for a file that cannot be read, that is of integers (which hold no radiance), or whose sides are those of no known layout.
+pub fn read_environment(path: &Path) -> Result<(Environment, Vec<String>), MapError> {
+    if let Some(name) = path.to_str().and_then(|p| p.strip_prefix(BUILTIN_PREFIX)) {
+        let row = builtin::find(name).ok_or_else(|| {
+            let names: Vec<&str> = builtin::TABLE.iter().map(|r| r.name).collect();
+            MapError::invalid(
+                path,
+                format!("there is no such environment; built in are {}", names.join(", ")),
+            )
+        })?;
+        return Ok((row.build(), Vec::new()));
+    }
+    let image = read_image(path, &read_file(path)?)?;
+    let (mut warnings, picture) = radiance(path, &image)?;
+    let Size { width, height } = picture.size();
+    let latitudes = if width == 2 * height {
+        picture
+    } else {
+        let fits = |l: &&Layout| width * l.sides.1 == height * l.sides.0 && width.is_multiple_of(l.sides.0);
+        let layout = LAYOUTS.iter().find(fits).ok_or_else(|| {
+            MapError::unsupported(
+                path,
+                format!(
+                    "is {width} × {height}; an environment is twice as wide as high, or a cube as a cross (4:3, 3:4) or a strip (6:1, 1:6)"
+                ),
+            )
+        })?;
+        unfold(&picture, layout)
+    };
+    if latitudes.texels().iter().all(|v| *v == Vec3::ZERO) {
+        warnings.push("is black".to_owned());
+    }
+    let environment = Environment::new(latitudes).map_err(|e| MapError::invalid(path, e))?;
+    Ok((environment, warnings))
+}
+
+/// The radiance of a picture; what is none is black, and counted.
+fn radiance(path: &Path, image: &Image) -> Result<(Vec<String>, Grid<Vec3>), MapError> {
+    let Samples::F32(samples) = &image.samples else {
+        return Err(MapError::unsupported(
+            path,
+            "is of integers; an environment is of floats, as .hdr and .exr are",
+        ));
+    };
+    let (mut negative, mut not_finite) = (0_usize, 0_usize);
+    let mut channel = |v: f32| {
+        if !v.is_finite() {
+            not_finite += 1;
+            return 0.0;
+        }
+        negative += usize::from(v < 0.0);
+        v.max(0.0)
+    };
+    let channels = image.channels;
+    let picture = Grid::from_fn(image.size, |x, y| {
+        let texel = &samples[(y * image.size.width + x) * channels..][..channels];
+        match *texel {
+            [r, g, b, ..] => Vec3::new(channel(r), channel(g), channel(b)),
+            [grey, ..] => Vec3::splat(channel(grey)),
+            [] => Vec3::ZERO,
+        }
+    });
+    let mut warnings = image.warnings.clone();
+    for (count, what) in [(negative, "negative"), (not_finite, "not finite")] {
+        if count > 0 {
+            warnings.push(format!("{count} samples are {what}, and taken as 0"));
+        }
+    }
+    Ok((warnings, picture))
+}
+
+/// Points over a texel, on each axis, whose mean it is.
+const POINTS: usize = 3;
+
+/// A cube's picture by latitude and longitude: as many texels around as four faces have.
+fn unfold(picture: &Grid<Vec3>, layout: &Layout) -> Grid<Vec3> {
+    let side = picture.size().width / layout.sides.0;
+    let size = Size { width: 4 * side, height: 2 * side };
+    // The directions of texels are the environment's business.
+    let blank = Environment::new(Grid::from_fn(size, |_, _| Vec3::ZERO))
+        .unwrap_or_else(|_| unreachable!("black is radiance"));
+    let look = |w: DVec3| {
+        let (face, at) = face_of(w);
+        let at = if layout.last_turned && face == 5 { -at } else { at };
+        let texel = |t: f64| (((t + 1.0) / 2.0 * side as f64) as usize).min(side - 1);
+        let (column, row) = layout.faces[face];
+        picture.row(row * side + texel(at.y))[column * side + texel(at.x)]
+    };
+    Grid::from_fn(size, |x, y| {
+        let mut sum = Vec3::ZERO;
+        for i in 0..POINTS * POINTS {
+            let part = |k: usize| (k as f64 + 0.5) / POINTS as f64;
+            sum += look(blank.direction(x as f64 + part(i % POINTS), y as f64 + part(i / POINTS)));
+        }
+        sum / (POINTS * POINTS) as f32
+    })
+}
+
+/// The face that a direction goes through, and where on it.
+fn face_of(w: DVec3) -> (usize, DVec2) {
+    let hit = |face: usize| {
+        let axis = cube_direction(face, 0.0, 0.0);
+        let depth = w.dot(axis);
+        let across =
+            [cube_direction(face, 1.0, 0.0), cube_direction(face, 0.0, 1.0)].map(|d| w.dot(d - axis));
+        (depth, DVec2::from(across) / depth)
+    };
+    let faces = (0..6).map(|face| (face, hit(face)));
+    let nearest = faces.max_by(|a, b| a.1.0.total_cmp(&b.1.0));
+    nearest.map_or((0, DVec2::ZERO), |(face, (_, at))| (face, at))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cubes_unfold_in_every_layout() {
+        // Each face of a colour of its own: what is ahead on +x must be +x's.
+        let colour = |face: usize| Vec3::new(face as f32 + 1.0, 0.5, 0.0);
+        for layout in &LAYOUTS {
+            let side = 8;
+            let size = Size { width: layout.sides.0 * side, height: layout.sides.1 * side };
+            let picture = Grid::from_fn(size, |x, y| {
+                let at = (x / side, y / side);
+                layout.faces.iter().position(|f| *f == at).map_or(Vec3::ZERO, colour)
+            });
+            let e = Environment::new(unfold(&picture, layout)).unwrap();
+            for face in 0..6 {
+                let w = cube_direction(face, 0.3, -0.4).normalize();
+                assert_eq!(e.radiance(w), colour(face).as_dvec3(), "{face}");
+            }
+        }
+    }
+}
