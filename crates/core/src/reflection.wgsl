@@ -136,5 +136,5 @@ fn facet(reflection: Reflection, n: vec3<f32>, finish: Finish, way: Way) -> vec3
     let f = fresnel(reflection.model, finish.specular, way.u);
     let diffuse = diffuse_share(reflection.model, f) * lambert;
     let lobe = brdf_evaluate(brdf_widen(reflection.base, finish.gloss), dot(n, way.wh));
-    return diffuse + f * (lobe * factor(reflection, n, way, finish.gloss));
+    return diffuse + brdf_tint(way.u) * f * (lobe * factor(reflection, n, way, finish.gloss));
 }

@@ -7,6 +7,7 @@
 use std::fmt::Display;
 
 use crate::brdf::Brdf;
+use crate::light::environment::Kernel;
 use crate::ndf::Method;
 
 /// A method's own part of a shader.
@@ -20,19 +21,32 @@ pub struct Shader {
     pub sources: &'static [&'static str],
     /// True when its text has `reflect_displaced` for itself: it knows of displacement.
     pub displaces: bool,
+    /// What lights its texels by an environment: `reflect_surround`.
+    pub surround: &'static str,
 }
+
+/// What makes a method's texels sums of isotropic lobes.
+const MIXTURE: &str = include_str!("ndf/mixture.wgsl");
+
+/// What some methods and all environments have.
+const SPHERE: &str = include_str!("sphere.wgsl");
 
 impl Shader {
     /// One without constants or a table.
     #[must_use]
     pub(crate) fn new(sources: &'static [&'static str]) -> Self {
-        Self { constants: String::new(), table: 1, sources, displaces: false }
+        let surround = if sources.contains(&MIXTURE) {
+            include_str!("ndf/mixture_environment.wgsl")
+        } else {
+            include_str!("ndf/whole_environment.wgsl")
+        };
+        Self { constants: String::new(), table: 1, sources, displaces: false, surround }
     }
 
     /// One whose text has `reflect_displaced`.
     #[must_use]
     pub(crate) fn displaces(self) -> Self {
-        Self { displaces: true, ..self }
+        Self { displaces: true, surround: include_str!("ndf/leadr_environment.wgsl"), ..self }
     }
 
     /// Adds a constant.
@@ -103,7 +117,32 @@ pub fn link(method: &dyn Method, lobe: &dyn Brdf, attributes: usize) -> String {
     text += &own.displaces.declare("DISPLACES");
     text += &own.constants;
     let plain: &[&str] = if own.displaces { &[] } else { &[include_str!("ndf/undisplaced.wgsl")] };
-    for source in SHARED.iter().chain([&lobe.shader()]).chain(own.sources).chain(plain) {
+    let lobe = lobe.shader();
+    for source in SHARED.iter().chain([&&*lobe]).chain(own.sources).chain(plain) {
+        text.push('\n');
+        text += source;
+    }
+    text
+}
+
+/// What environments share: [`crate::light`], [`crate::ndf`] under them.
+const ENVIRONMENT: [&str; 6] = [
+    include_str!("light/environment/environment.wgsl"),
+    include_str!("light/environment/cube.wgsl"),
+    include_str!("light/environment/harmonics.wgsl"),
+    include_str!("light/environment/half_vectors.wgsl"),
+    include_str!("light/split_sum.wgsl"),
+    include_str!("ndf/environment.wgsl"),
+];
+
+/// The text that lights texels by an environment, to stand beside what [`link`] makes: `reflect_surround`. What the host brings besides is
+/// said in `light/environment/environment.wgsl`.
+#[must_use]
+pub fn link_environment(method: &dyn Method, lobe: &dyn Brdf) -> String {
+    let own = method.shader();
+    let mut text = (lobe.kernel() == Kernel::Beckmann).declare("GAUSSIAN_FACETS");
+    let sphere = (!own.sources.contains(&SPHERE)).then_some(SPHERE);
+    for source in ENVIRONMENT.iter().copied().chain(sphere).chain([own.surround]) {
         text.push('\n');
         text += source;
     }
@@ -114,5 +153,5 @@ pub fn link(method: &dyn Method, lobe: &dyn Brdf, attributes: usize) -> String {
 #[must_use]
 pub fn link_lobe(lobe: &dyn Brdf) -> String {
     let [reflection, lambert, masking, _] = SHARED;
-    [&1u32.declare("TABLE"), reflection, lambert, masking, lobe.shader()].join("\n")
+    [&1u32.declare("TABLE"), reflection, lambert, masking, &*lobe.shader()].join("\n")
 }

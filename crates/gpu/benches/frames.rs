@@ -203,7 +203,7 @@ fn start(spelling: &str, size: Size) -> Outcome<()> {
     let begin = Instant::now();
     let device = Device::open()?;
     let opened = begin.elapsed();
-    let renderer = Renderer::new(&device);
+    let renderer = Renderer::new(&device)?;
     let geometry = Geometry::new(&device, &scene)?;
     let baking = Instant::now();
     let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ())?;
@@ -236,7 +236,7 @@ fn main() -> Outcome<()> {
     for spelling in ["toksvig", "vmf:4", "phong:4"] {
         start(spelling, size)?;
     }
-    let renderer = Renderer::new(&device);
+    let renderer = Renderer::new(&device)?;
     let bench = Bench { device: &device, renderer: &renderer, runs };
     // 640 x 480 for the default size, as in Han et al.
     bench.creature(Size { width: side * 32 / 25, height: side * 24 / 25 })?;

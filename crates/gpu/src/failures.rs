@@ -61,7 +61,7 @@ fn frames_are_timed_with_and_without_a_clock_on_the_device() {
         let geometry = Geometry::new(&device, &scene).unwrap();
         let shown = Shown { scene: &scene, geometry: &geometry, camera: &scene.camera };
         let canvas = Canvas::new(&device, SMALL, Outlines::Sharp).unwrap();
-        let renderer = Renderer::new(&device);
+        let renderer = Renderer::new(&device).unwrap();
         let ms = renderer.time(&canvas, &shown, &maps, Lookups::TRILINEAR).unwrap();
         assert!(ms > 0.0 && ms < 1e4, "{ms}");
     }
@@ -73,7 +73,7 @@ fn a_lost_device_is_an_error() {
     let (scene, method) = (foil(SMALL), ndf::parse("naive").unwrap());
     let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
     let geometry = Geometry::new(&device, &scene).unwrap();
-    let renderer = Renderer::new(&device);
+    let renderer = Renderer::new(&device).unwrap();
     let canvas = Canvas::new(&device, SMALL, Outlines::Sharp).unwrap();
     device.device.destroy();
     let shown = Shown { scene: &scene, geometry: &geometry, camera: &scene.camera };

@@ -5,6 +5,7 @@
 
 mod canvas;
 mod device;
+mod environment;
 mod error;
 pub mod export;
 #[cfg(test)]

@@ -16,6 +16,9 @@ const SCENE: &str = concat!(include_str!("passes/vertices.wgsl"), "\n", include_
 /// What passes that shade know of a material.
 const MATERIAL: &str = include_str!("passes/material.wgsl");
 
+/// What the pass that draws brings to an environment's shading.
+const SURROUNDINGS: &str = include_str!("passes/environment.wgsl");
+
 /// The pass that draws the truth.
 const TRUTH: &str = include_str!("passes/truth.wgsl");
 
@@ -50,7 +53,8 @@ pub fn check(text: String) -> Result<Linked, GpuError> {
 /// # Errors
 /// [`GpuError::Shader`].
 pub fn draw(method: &dyn Method, lobe: &dyn Brdf, attributes: usize) -> Result<Linked, GpuError> {
-    check([&shader::link(method, lobe, attributes), LOOKUP, SCENE, MATERIAL, DRAW].join("\n"))
+    let (own, lit) = (shader::link(method, lobe, attributes), shader::link_environment(method, lobe));
+    check([&own, &lit, LOOKUP, SCENE, MATERIAL, SURROUNDINGS, DRAW].join("\n"))
 }
 
 /// The shader that draws the truth of a lobe. It has no method in it.

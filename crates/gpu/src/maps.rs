@@ -115,13 +115,18 @@ pub(crate) fn sampler(device: &Device, wraps: Wraps, anisotropy: u16) -> wgpu::S
 
 /// How texels lie in a texture.
 #[derive(Clone, Copy)]
-struct Stored {
-    layers: usize,
-    levels: usize,
-    format: wgpu::TextureFormat,
+pub(crate) struct Stored {
+    pub(crate) layers: usize,
+    pub(crate) levels: usize,
+    pub(crate) format: wgpu::TextureFormat,
 }
 
-fn create(device: &Device, what: &str, size: Size, stored: Stored) -> Result<wgpu::Texture, GpuError> {
+pub(crate) fn create(
+    device: &Device,
+    what: &str,
+    size: Size,
+    stored: Stored,
+) -> Result<wgpu::Texture, GpuError> {
     let extent = wgpu::Extent3d {
         width: size.width as u32,
         height: size.height as u32,
@@ -141,7 +146,7 @@ fn create(device: &Device, what: &str, size: Size, stored: Stored) -> Result<wgp
 }
 
 /// Uploads a level: its layers one after another, each rows of texels.
-fn write(device: &Device, texture: &wgpu::Texture, level: u32, size: Size, bytes: &[u8]) {
+pub(crate) fn write(device: &Device, texture: &wgpu::Texture, level: u32, size: Size, bytes: &[u8]) {
     let (width, height) = (size.width as u32, size.height as u32);
     let row = texture.format().block_copy_size(None).unwrap_or(8) * width;
     for (layer, bytes) in bytes.chunks_exact(row as usize * size.height).enumerate() {
@@ -161,7 +166,7 @@ fn write(device: &Device, texture: &wgpu::Texture, level: u32, size: Size, bytes
     }
 }
 
-fn array_view(texture: &wgpu::Texture) -> wgpu::TextureView {
+pub(crate) fn array_view(texture: &wgpu::Texture) -> wgpu::TextureView {
     texture.create_view(&wgpu::TextureViewDescriptor {
         dimension: Some(wgpu::TextureViewDimension::D2Array),
         ..wgpu::TextureViewDescriptor::default()

@@ -14,9 +14,9 @@ use crate::{Device, GpuError};
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub(crate) enum Key {
     /// A method (its spelling), a lobe (its text), attributes, the entry point, outlines.
-    Draw(String, &'static str, usize, &'static str, u32),
+    Draw(String, String, usize, &'static str, u32),
     /// The truth of a lobe.
-    Truth(&'static str),
+    Truth(String),
     /// Places and faces.
     Place,
 }
@@ -24,9 +24,9 @@ pub(crate) enum Key {
 /// Layouts that all pipelines share, and the pipelines.
 pub(crate) struct Pipelines<'a> {
     device: &'a Device,
-    /// Group 0: view, lights, triangles, mask.
+    /// Group 0: view, lights, triangles, mask, environment.
     pub(crate) scene: wgpu::BindGroupLayout,
-    /// Group 1 of [`Key::Draw`]: material, map, colours, sampler.
+    /// Group 1 of [`Key::Draw`]: material, map, colours, sampler, what it makes of an environment.
     pub(crate) material: wgpu::BindGroupLayout,
     /// Group 1 of [`Key::Truth`]: material, normals, colours.
     pub(crate) finest: wgpu::BindGroupLayout,
@@ -67,6 +67,10 @@ impl<'a> Pipelines<'a> {
                 entry(3, storage()),
                 entry(4, storage()),
                 entry(5, texture(wgpu::TextureSampleType::Uint, false)),
+                entry(6, uniform()),
+                entry(7, texture(float(true), true)),
+                entry(8, texture(float(false), false)),
+                entry(9, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
             ],
         );
         let material = layout(
@@ -76,6 +80,8 @@ impl<'a> Pipelines<'a> {
                 entry(1, texture(float(true), true)),
                 entry(2, texture(float(true), true)),
                 entry(3, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
+                entry(4, texture(float(false), false)),
+                entry(5, texture(float(true), true)),
             ],
         );
         let finest = layout(
@@ -97,7 +103,8 @@ impl<'a> Pipelines<'a> {
         entry: &'static str,
         outlines: Outlines,
     ) -> Result<Arc<wgpu::RenderPipeline>, GpuError> {
-        let key = Key::Draw(method.spelling(), lobe.shader(), attributes, entry, outlines.samples());
+        let key =
+            Key::Draw(method.spelling(), lobe.shader().into_owned(), attributes, entry, outlines.samples());
         self.get(key, || {
             let text = link::draw(method, lobe, attributes)?.text;
             let targets = [outlines.format()];
@@ -108,7 +115,7 @@ impl<'a> Pipelines<'a> {
 
     /// The pipeline that draws the truth of a lobe.
     pub(crate) fn truth(&self, lobe: &dyn Brdf) -> Result<Arc<wgpu::RenderPipeline>, GpuError> {
-        self.get(Key::Truth(lobe.shader()), || {
+        self.get(Key::Truth(lobe.shader().into_owned()), || {
             let text = link::truth(lobe)?.text;
             let outlines = Outlines::Sharp;
             let targets = [outlines.format()];

@@ -4,7 +4,11 @@ use glam::DVec2;
 use ndfmap_core::lookup::Filtering;
 use ndfmap_core::scene::{Camera, Material, Scene};
 
+use ndfmap_core::light::SplitSum;
+use ndfmap_core::light::environment::Surroundings;
+
 use crate::canvas::{Canvas, Outlines, PARTS};
+use crate::environment::Environments;
 use crate::geometry::Geometry;
 use crate::maps::{Maps, Textures, sampler};
 use crate::pipelines::Pipelines;
@@ -53,6 +57,7 @@ pub struct Renderer<'a> {
     pipelines: Pipelines<'a>,
     accumulate: wgpu::ComputePipeline,
     outlines: wgpu::ComputePipeline,
+    environments: Environments<'a>,
     /// Stands for a mask where there is none.
     no_mask: wgpu::TextureView,
 }
@@ -74,8 +79,10 @@ pub(crate) struct Pass<'a> {
 
 impl<'a> Renderer<'a> {
     /// Prepares to draw.
-    #[must_use]
-    pub fn new(device: &'a Device) -> Self {
+    ///
+    /// # Errors
+    /// [`GpuError`] when there is no room for the least textures.
+    pub fn new(device: &'a Device) -> Result<Self, GpuError> {
         let no_mask = device.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("no mask"),
             size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
@@ -86,13 +93,14 @@ impl<'a> Renderer<'a> {
             usage: wgpu::TextureUsages::TEXTURE_BINDING,
             view_formats: &[],
         });
-        Self {
+        Ok(Self {
             device,
+            environments: Environments::new(device)?,
             pipelines: Pipelines::new(device),
             accumulate: device.compute_pipeline(include_str!("passes/accumulate.wgsl")),
             outlines: device.compute_pipeline(include_str!("passes/outlines.wgsl")),
             no_mask: no_mask.create_view(&wgpu::TextureViewDescriptor::default()),
-        }
+        })
     }
 
     /// Draws a picture; [`Canvas::read`] has it. Waits for the picture before, so that no queue grows without end.
@@ -109,7 +117,7 @@ impl<'a> Renderer<'a> {
         self.device.wait()?;
         let dressed = self.dress(shown.scene, maps, lookups, canvas.outlines)?;
         let view = View::new(shown.camera, canvas.size, shown.geometry).on(canvas, lookups.sampling);
-        self.pass(canvas, shown, &Pass { view, dressed: &dressed, clock: None });
+        self.pass(canvas, shown, &Pass { view, dressed: &dressed, clock: None })?;
         self.add(canvas, (0.0, 1.0), false);
         if canvas.outlines != Outlines::Parts {
             return Ok(());
@@ -122,7 +130,7 @@ impl<'a> Renderer<'a> {
             let camera = Camera { shift: shown.camera.shift - offset, ..*shown.camera };
             let moved = View::new(&camera, canvas.size, shown.geometry);
             let view = View { width: 1.0 / PARTS as f32, masked: 1, ..moved.on(canvas, lookups.sampling) };
-            self.pass(canvas, shown, &Pass { view, dressed: &dressed, clock: None });
+            self.pass(canvas, shown, &Pass { view, dressed: &dressed, clock: None })?;
             self.add(canvas, (if i == 0 { 0.0 } else { 1.0 }, share), true);
         }
         Ok(())
@@ -146,12 +154,15 @@ impl<'a> Renderer<'a> {
     }
 
     /// Milliseconds of one pass.
-    pub(crate) fn clocked(&self, pass: impl FnOnce(Option<&wgpu::QuerySet>)) -> Result<f64, GpuError> {
+    pub(crate) fn clocked(
+        &self,
+        pass: impl FnOnce(Option<&wgpu::QuerySet>) -> Result<(), GpuError>,
+    ) -> Result<f64, GpuError> {
         let device = self.device;
         device.wait()?;
         if !device.has_timestamps() {
             let start = std::time::Instant::now();
-            pass(None);
+            pass(None)?;
             device.wait()?;
             return Ok(start.elapsed().as_secs_f64() * 1e3);
         }
@@ -160,7 +171,7 @@ impl<'a> Renderer<'a> {
             ty: wgpu::QueryType::Timestamp,
             count: 2,
         });
-        pass(Some(&queries));
+        pass(Some(&queries))?;
         let stamps = device.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("timestamps"),
             size: 16,
@@ -193,6 +204,9 @@ impl<'a> Renderer<'a> {
             let pipeline = self.pipelines.draw((maps.method, lobe), textures.attributes, entry, outlines)?;
             let bytes = uniforms::material(material, textures, Some(maps.method), lookups.at_means);
             let sampler = sampler(self.device, textures.wraps, anisotropy);
+            let (split_sums, blurred) = self
+                .environments
+                .bind_material(scene.surroundings.as_ref(), || SplitSum::new(&material.reflection))?;
             let group = self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("material"),
                 layout: &self.pipelines.material,
@@ -201,6 +215,8 @@ impl<'a> Renderer<'a> {
                     bind(1, wgpu::BindingResource::TextureView(&textures.map)),
                     bind(2, wgpu::BindingResource::TextureView(&textures.finish)),
                     bind(3, wgpu::BindingResource::Sampler(&sampler)),
+                    bind(4, wgpu::BindingResource::TextureView(&split_sums)),
+                    bind(5, wgpu::BindingResource::TextureView(&blurred)),
                 ],
             });
             Ok(Dressed { pipeline, group })
@@ -232,16 +248,25 @@ impl<'a> Renderer<'a> {
     }
 
     /// Group 0 of a pass; the mask is read only where it is not being made.
-    fn scene_group(&self, shown: &Shown<'_>, view: View, mask: &wgpu::TextureView) -> wgpu::BindGroup {
+    fn scene_group(
+        &self,
+        shown: &Shown<'_>,
+        view: View,
+        mask: &wgpu::TextureView,
+    ) -> Result<wgpu::BindGroup, GpuError> {
         let geometry = shown.geometry;
         let of = |light| LightUniform::new(light, geometry.middle);
         let mut lights: Vec<LightUniform> = shown.scene.lights.iter().map(of).collect();
+        let surroundings = shown.scene.surroundings.as_ref();
+        let suns = surroundings.map_or_else(Vec::new, Surroundings::suns);
+        lights.extend(suns.iter().map(LightUniform::of_environment));
+        let environment = self.environments.bind(surroundings)?;
         let view = View { lights: lights.len() as u32, ..view };
         if lights.is_empty() {
             lights.push(bytemuck::Zeroable::zeroed());
         }
         let lights = self.device.upload(bytemuck::cast_slice(&lights), wgpu::BufferUsages::STORAGE);
-        self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        Ok(self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("scene"),
             layout: &self.pipelines.scene,
             entries: &[
@@ -251,12 +276,21 @@ impl<'a> Renderer<'a> {
                 bind(3, geometry.corners.as_entire_binding()),
                 bind(4, geometry.triangles.as_entire_binding()),
                 bind(5, wgpu::BindingResource::TextureView(mask)),
+                bind(6, self.uniform(bytemuck::bytes_of(&environment.uniform)).as_entire_binding()),
+                bind(7, wgpu::BindingResource::TextureView(&environment.radiance)),
+                bind(8, wgpu::BindingResource::TextureView(&environment.half_vectors)),
+                bind(9, wgpu::BindingResource::Sampler(&self.environments.sampler)),
             ],
-        })
+        }))
     }
 
     /// Draws all triangles on the canvas's target; where the view is masked, only where the canvas's mask says so.
-    pub(crate) fn pass(&self, canvas: &Canvas<'_>, shown: &Shown<'_>, pass: &Pass<'_>) {
+    pub(crate) fn pass(
+        &self,
+        canvas: &Canvas<'_>,
+        shown: &Shown<'_>,
+        pass: &Pass<'_>,
+    ) -> Result<(), GpuError> {
         let Pass { view, dressed, clock } = *pass;
         let background = shown.scene.background.as_dvec3();
         let clear = wgpu::Color { r: background.x, g: background.y, b: background.z, a: 1.0 };
@@ -267,7 +301,7 @@ impl<'a> Renderer<'a> {
             ops: wgpu::Operations { load: wgpu::LoadOp::Clear(clear), store: wgpu::StoreOp::Store },
         };
         let group =
-            self.scene_group(shown, view, if view.masked == 1 { &canvas.mask } else { &self.no_mask });
+            self.scene_group(shown, view, if view.masked == 1 { &canvas.mask } else { &self.no_mask })?;
         self.encode(canvas, &[Some(target)], clock, |pass| {
             pass.set_bind_group(0, &group, &[]);
             for part in &shown.geometry.parts {
@@ -277,6 +311,7 @@ impl<'a> Renderer<'a> {
                 pass.draw(part.corners.clone(), 0..1);
             }
         });
+        Ok(())
     }
 
     fn encode(
@@ -316,7 +351,7 @@ impl<'a> Renderer<'a> {
     /// Marks the canvas's pixels that have an outline in them.
     fn find_outlines(&self, canvas: &Canvas<'_>, shown: &Shown<'_>, view: View) -> Result<(), GpuError> {
         let pipeline = self.pipelines.place()?;
-        let group = self.scene_group(shown, view, &self.no_mask);
+        let group = self.scene_group(shown, view, &self.no_mask)?;
         let target = |view| {
             Some(wgpu::RenderPassColorAttachment {
                 view,

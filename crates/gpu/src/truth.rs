@@ -86,7 +86,7 @@ impl Renderer<'_> {
                     for stratum in 0..STRATA * STRATA {
                         let number = (2 * round + half) * STRATA * STRATA + stratum;
                         let view = jittered(shown, canvas, stratum, number as u32);
-                        self.pass(canvas, shown, &Pass { view, dressed: &dressed, clock: None });
+                        self.pass(canvas, shown, &Pass { view, dressed: &dressed, clock: None })?;
                         let first = round == done && stratum == 0;
                         self.add(canvas, (if first { 0.0 } else { 1.0 }, 1.0), false);
                     }

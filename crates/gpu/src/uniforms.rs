@@ -85,6 +85,13 @@ pub(crate) struct LightUniform {
 }
 
 impl LightUniform {
+    /// A small bright source of an environment.
+    pub(crate) fn of_environment(light: &Light) -> Self {
+        let mut uniform = Self::new(light, DVec3::ZERO);
+        uniform.power.w = 1.0;
+        uniform
+    }
+
     /// A light; places are relative to `middle`.
     pub(crate) fn new(light: &Light, middle: DVec3) -> Self {
         match *light {

@@ -38,7 +38,7 @@ fn off(a: &Picture, b: &Picture, exposure: f32) -> f64 {
 #[test]
 fn every_method_draws_what_the_cpu_draws() {
     let Some(device) = device() else { return };
-    let (renderer, size) = (Renderer::new(&device), Size { width: 240, height: 200 });
+    let (renderer, size) = (Renderer::new(&device).unwrap(), Size { width: 240, height: 200 });
     let canvas = Canvas::new(&device, size, Outlines::Parts).unwrap();
     let scenes = [("disk", 0.4), ("armour", 0.3), ("plane", 0.0)];
     let scenes = scenes.map(|(name, time)| (name, staged(name, time, 128)));
@@ -76,7 +76,7 @@ fn every_method_draws_what_the_cpu_draws() {
 #[test]
 fn the_truth_is_the_truth() {
     let Some(device) = device() else { return };
-    let (renderer, size) = (Renderer::new(&device), Size { width: 120, height: 100 });
+    let (renderer, size) = (Renderer::new(&device).unwrap(), Size { width: 120, height: 100 });
     let sharp = Canvas::new(&device, size, Outlines::Sharp).unwrap();
     let parts = Canvas::new(&device, size, Outlines::Parts).unwrap();
     let method = ndf::parse("vmf:4").unwrap();
@@ -127,7 +127,7 @@ fn the_truth_is_the_truth() {
 fn the_sampler_is_near_our_taps() {
     // What samplers do is their own business; but one that is far from a plain trilinear filter would be a bug of ours.
     let Some(device) = device() else { return };
-    let (renderer, size) = (Renderer::new(&device), Size { width: 200, height: 200 });
+    let (renderer, size) = (Renderer::new(&device).unwrap(), Size { width: 200, height: 200 });
     let scene = staged("disk", 0.3, 256);
     let method = ndf::parse("vmf:4").unwrap();
     let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
@@ -149,7 +149,7 @@ fn the_sampler_is_near_our_taps() {
 #[test]
 fn colours_and_gloss_of_maps_are_drawn_too() {
     let Some(device) = device() else { return };
-    let (renderer, size) = (Renderer::new(&device), Size { width: 160, height: 160 });
+    let (renderer, size) = (Renderer::new(&device).unwrap(), Size { width: 160, height: 160 });
     let canvas = Canvas::new(&device, size, Outlines::Parts).unwrap();
     let mut scene = staged("foil", 0.5, 64);
     let map = Size { width: 64, height: 64 };
@@ -184,7 +184,7 @@ fn colours_and_gloss_of_maps_are_drawn_too() {
 #[test]
 fn displaced_scenes_are_the_cpus() {
     let Some(device) = device() else { return };
-    let (renderer, size) = (Renderer::new(&device), Size { width: 240, height: 200 });
+    let (renderer, size) = (Renderer::new(&device).unwrap(), Size { width: 240, height: 200 });
     let canvas = Canvas::new(&device, size, Outlines::Parts).unwrap();
     for (name, time, shadows) in
         [("noise-sphere", 0.1, false), ("armour", 0.2, true), ("desert", 0.4, false), ("plane", 0.0, true)]

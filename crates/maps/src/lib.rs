@@ -11,6 +11,7 @@ mod error;
 pub mod formats;
 mod header;
 mod image;
+pub mod merl;
 pub mod model;
 mod ndf_map;
 pub mod picture;

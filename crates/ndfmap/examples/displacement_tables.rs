@@ -6,6 +6,7 @@
 
 use std::path::Path;
 
+use ndfmap::core::brdf::Lambert;
 use ndfmap::core::grid::{Grid, Size};
 use ndfmap::core::metrics::{Picture, relative_l2};
 use ndfmap::core::ndf;
@@ -40,7 +41,7 @@ struct Plan {
 fn scene_of(plan: &Plan, name: &str, deviation: f64) -> Result<Scene, Box<dyn std::error::Error>> {
     let row = scene::find(name).ok_or("no such scene")?;
     let mut scene = (row.build)(&plan.staging);
-    scene.set_brdf("lambert")?;
+    scene.set_brdf(&Lambert::SHARP);
     scene.displace(deviation / DEVIATION, false)?;
     Ok(scene)
 }

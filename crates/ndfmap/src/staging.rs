@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec3;
+use ndfmap_core::brdf::Brdf;
 use ndfmap_core::grid::Size;
 use ndfmap_core::light::Light;
 use ndfmap_core::light::environment::Surroundings;
@@ -23,7 +24,7 @@ pub(crate) struct Stage {
     pub(crate) map: Option<Arc<dyn Surface>>,
     /// Size of built-in maps.
     pub(crate) map_size: Option<Size>,
-    pub(crate) brdf: Option<String>,
+    pub(crate) brdf: Option<Arc<dyn Brdf>>,
     pub(crate) model: Option<Model>,
     pub(crate) camera: Option<CameraArgument>,
     pub(crate) lights: Vec<Light>,
@@ -68,6 +69,17 @@ impl Stage {
             || self.environment.as_ref().is_some_and(|e| e.turn[0] != e.turn[1])
     }
 
+    /// Gives the first material the colours that were asked for.
+    fn colour(&self, scene: &mut Scene) {
+        if let Some(first) = scene.materials.first_mut()
+            && (self.diffuse.is_some() || self.specular.is_some())
+        {
+            first.finish.diffuse = self.diffuse.unwrap_or(first.finish.diffuse);
+            first.finish.specular = self.specular.unwrap_or(first.finish.specular);
+            first.finish_map = None;
+        }
+    }
+
     /// The scene at a time.
     pub(crate) fn set(&self, time: f64) -> Result<Scene, Failure> {
         let mut staging = Staging { time, map: self.map.clone(), ..Staging::default() };
@@ -83,20 +95,22 @@ impl Stage {
                 scene
             }
         };
-        if let Some(first) = scene.materials.first_mut()
-            && (self.diffuse.is_some() || self.specular.is_some())
-        {
-            first.finish.diffuse = self.diffuse.unwrap_or(first.finish.diffuse);
-            first.finish.specular = self.specular.unwrap_or(first.finish.specular);
-            first.finish_map = None;
-        }
+        self.colour(&mut scene);
         if let Some(brdf) = &self.brdf {
-            scene.set_brdf(brdf).map_err(|e| Failure::Usage(e.to_string()))?;
+            scene.set_brdf(&**brdf);
+            if brdf.measured().is_some() {
+                // It has brought its own.
+                self.colour(&mut scene);
+            }
         }
         if let Some(model) = self.model {
             scene.set_model(model);
         }
         if let Some(Displacement { scale, shadows }) = self.displacement {
+            if let Some(measured) = self.brdf.as_ref().filter(|brdf| brdf.measured().is_some()) {
+                let why = "a measured lobe is none of microfacets, which displaced surfaces are made of";
+                return Err(Failure::Usage(format!("--displace: {}: {why}", measured.spelling())));
+            }
             scene.displace(scale, shadows).map_err(|e| {
                 Failure::Usage(format!("--displace {}: {e}; name one with `--map`", self.scene))
             })?;

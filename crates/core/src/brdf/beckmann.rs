@@ -4,9 +4,10 @@
 //! Zonal coefficients by quadrature: their moments have an upward recurrence, but it loses all digits
 //! for small alpha.
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
-use super::{Argument, Brdf, Row, number};
+use super::{Argument, Brdf, Row, number, untinted};
 use crate::units::{Alpha, SlopeVariance};
 
 /// A Beckmann distribution of microfacets.
@@ -92,8 +93,8 @@ impl Brdf for Beckmann {
         self.widened(by).evaluate(u)
     }
 
-    fn shader(&self) -> &'static str {
-        include_str!("beckmann.wgsl")
+    fn shader(&self) -> Cow<'static, str> {
+        untinted(include_str!("beckmann.wgsl"))
     }
 
     fn base(&self) -> f64 {

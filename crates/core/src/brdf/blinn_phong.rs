@@ -3,9 +3,10 @@
 //! Zonal coefficients: `∫ u^s P_l du` obeys `a_l = a_{l-2} (s-l+2)/(s+l+1)`, exactly; the paper prints
 //! `exp(-l²/2s)`. Widening: `s' = kappa s / (kappa + s)`, which adds the variances `1/s` and `1/kappa`.
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
-use super::{Argument, Brdf, Row, number};
+use super::{Argument, Brdf, Row, number, untinted};
 use crate::units::{Exponent, SlopeVariance};
 
 /// A normalised Blinn-Phong highlight.
@@ -69,8 +70,8 @@ impl Brdf for BlinnPhong {
         self.widened(by).evaluate(u)
     }
 
-    fn shader(&self) -> &'static str {
-        include_str!("blinn_phong.wgsl")
+    fn shader(&self) -> Cow<'static, str> {
+        untinted(include_str!("blinn_phong.wgsl"))
     }
 
     fn base(&self) -> f64 {

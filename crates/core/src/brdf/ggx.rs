@@ -4,9 +4,10 @@
 //! Widening borrows Beckmann's rule, `alpha'² = alpha² + 2v`, as every engine does: GGX is no Gaussian and
 //! has no variance, so this is a convention; `compare` measures what it costs. Zonal coefficients by quadrature.
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
-use super::{Argument, Brdf, Row, number};
+use super::{Argument, Brdf, Row, number, untinted};
 use crate::light::environment::Kernel;
 use crate::units::{Alpha, SlopeVariance};
 
@@ -98,8 +99,8 @@ impl Brdf for Ggx {
         self.widened(by).evaluate(u)
     }
 
-    fn shader(&self) -> &'static str {
-        include_str!("ggx.wgsl")
+    fn shader(&self) -> Cow<'static, str> {
+        untinted(include_str!("ggx.wgsl"))
     }
 
     fn base(&self) -> f64 {

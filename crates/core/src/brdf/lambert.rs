@@ -4,9 +4,10 @@
 //! Widening: for normals of a vMF lobe around `mu`, `w·n` has mean `A_1 (w·mu)` and a variance that is
 //! known in closed form; taking it as Gaussian, the mean of `max(w·n, 0)` is `m Phi(m/s) + s phi(m/s)`.
 
+use std::borrow::Cow;
 use std::f64::consts::{PI, SQRT_2};
 
-use super::{Argument, Brdf, Row};
+use super::{Argument, Brdf, Row, untinted};
 use crate::units::SlopeVariance;
 
 /// A diffuse surface, perhaps already widened by a lobe of normals.
@@ -83,8 +84,8 @@ impl Brdf for Lambert {
         self.widened(by).evaluate(u)
     }
 
-    fn shader(&self) -> &'static str {
-        include_str!("diffuse_only.wgsl")
+    fn shader(&self) -> Cow<'static, str> {
+        untinted(include_str!("diffuse_only.wgsl"))
     }
 
     fn base(&self) -> f64 {

@@ -9,14 +9,17 @@ mod beckmann;
 mod blinn_phong;
 mod ggx;
 mod lambert;
+pub mod measured;
 mod torrance_sparrow;
 
 pub use beckmann::Beckmann;
 pub use blinn_phong::BlinnPhong;
 pub use ggx::Ggx;
 pub use lambert::{Lambert, mean_of_positive_part};
+pub use measured::{Factors, Measured};
 pub use torrance_sparrow::TorranceSparrow;
 
+use std::borrow::Cow;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::fmt::Debug;
 
@@ -69,6 +72,11 @@ pub trait Brdf: Send + Sync + Debug {
         DVec3::ONE
     }
 
+    /// The factors of a material that was measured as a whole: its diffuse part belongs to the lobe.
+    fn measured(&self) -> Option<&Factors> {
+        None
+    }
+
     /// The microfacets whose blur of an environment is most like this lobe's.
     fn kernel(&self) -> Kernel {
         Kernel::Beckmann
@@ -102,8 +110,8 @@ pub trait Brdf: Send + Sync + Debug {
     }
 
     /// Text of the twin in WGSL: `SPECULAR` and the functions `brdf_widen`, `brdf_evaluate`, `brdf_variance`, `brdf_masking`,
-    /// `brdf_slope_profile`, `brdf_visible_area`.
-    fn shader(&self) -> &'static str;
+    /// `brdf_slope_profile`, `brdf_visible_area`, `brdf_tint`.
+    fn shader(&self) -> Cow<'static, str>;
 
     /// The one number, `base`, that the twin's functions take for this lobe.
     fn base(&self) -> f64;
@@ -153,7 +161,15 @@ pub struct Row {
 }
 
 /// Every lobe there is.
-pub static TABLE: &[Row] = &[lambert::ROW, blinn_phong::ROW, torrance_sparrow::ROW, beckmann::ROW, ggx::ROW];
+pub static TABLE: &[Row] = &[
+    lambert::ROW,
+    blinn_phong::ROW,
+    torrance_sparrow::ROW,
+    beckmann::ROW,
+    ggx::ROW,
+    measured::SGD,
+    measured::ABC,
+];
 
 /// A spelling that names no lobe.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -181,6 +197,11 @@ pub fn parse(spelling: &str) -> Result<Box<dyn Brdf>, ParseBrdfError> {
         TABLE.iter().find(|row| row.name == name).ok_or_else(|| ParseBrdfError::Unknown(name.to_owned()))?;
     (row.parse)(parameter)
         .map_err(|reason| ParseBrdfError::Parameter { spelling: spelling.to_owned(), reason })
+}
+
+/// The text of a lobe without a colour of its own.
+fn untinted(text: &str) -> Cow<'static, str> {
+    [text, include_str!("untinted.wgsl")].join("\n").into()
 }
 
 /// Reads the one number of a lobe into its unit.

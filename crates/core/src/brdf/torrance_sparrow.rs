@@ -4,9 +4,10 @@
 //! Zonal coefficients by quadrature; the paper prints `exp(-(sigma l)²)`. Widening (their section 6.2):
 //! `sigma' = sqrt(sigma² + 1/(2 kappa))`. The lobe ends at the horizon, beta = 90°.
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
-use super::{Argument, Brdf, Row, number};
+use super::{Argument, Brdf, Row, number, untinted};
 use crate::units::{LobeAngle, SlopeVariance};
 
 /// A Gaussian of the angle to the half-vector.
@@ -68,8 +69,8 @@ impl Brdf for TorranceSparrow {
         self.widened(by).evaluate(u)
     }
 
-    fn shader(&self) -> &'static str {
-        include_str!("torrance_sparrow.wgsl")
+    fn shader(&self) -> Cow<'static, str> {
+        untinted(include_str!("torrance_sparrow.wgsl"))
     }
 
     fn base(&self) -> f64 {

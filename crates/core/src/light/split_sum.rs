@@ -10,6 +10,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use glam::DVec3;
 use rayon::prelude::*;
 
+use crate::brdf::Brdf;
 use crate::light::environment::{HALF_VECTOR_ORDER, Kernel};
 use crate::reflection::{Model, Reflection, Way};
 use crate::sphere::gauss_legendre;
@@ -55,6 +56,8 @@ pub struct SplitSum {
     pub zonal: [f64; HALF_VECTOR_ORDER + 1],
     /// The cubes that its highlights look up.
     pub kernel: Kernel,
+    /// Facets of the lobe, per unit of map: the integral of its profile over slopes.
+    pub facets: f64,
 }
 
 impl SplitSum {
@@ -71,6 +74,7 @@ impl SplitSum {
             entries: (0..ENTRIES * ENTRIES).into_par_iter().map(entry).collect(),
             zonal: std::array::from_fn(|l| coefficients[l]),
             kernel: reflection.lobe.kernel(),
+            facets: facets(&*reflection.lobe),
         }
     }
 
@@ -87,8 +91,8 @@ impl SplitSum {
         row(j).mix(row(j + 1), y - j as f64)
     }
 
-    /// The table as shaders take it, two texels an entry: scale and bias; lobe, rise, and two spare. Two rows more hold the zonal
-    /// coefficients, from the left.
+    /// The table as shaders take it, two texels an entry: scale and bias; lobe, rise, and two spare. One row more holds the zonal
+    /// coefficients from the left, and in its first texel, second, the facets.
     #[must_use]
     pub fn texels(&self) -> Vec<[f32; 4]> {
         let of = |e: &Reflected| {
@@ -96,10 +100,24 @@ impl SplitSum {
             [[r, g, b, e.bias], [e.lobe, e.rise, 0.0, 0.0]].map(|texel| texel.map(|v| v as f32))
         };
         let mut texels: Vec<[f32; 4]> = self.entries.iter().flat_map(of).collect();
-        let zonal = |l: usize| [self.zonal.get(l).copied().unwrap_or(0.0) as f32, 0.0, 0.0, 0.0];
+        let zonal =
+            |l: usize| [self.zonal.get(l).copied().unwrap_or(0.0) as f32, self.facets as f32, 0.0, 0.0];
         texels.extend((0..2 * ENTRIES).map(zonal));
         texels
     }
+}
+
+/// Integral of a lobe's profile over slopes, in its own deviations, to sixty-four of them.
+fn facets(lobe: &dyn Brdf) -> f64 {
+    let (mut sum, mut from, mut to) = (0.0, 0.0, 1.0);
+    while to <= 64.0 {
+        for (node, weight) in gauss_legendre(16) {
+            let t = from + (to - from) * (node + 1.0) / 2.0;
+            sum += TAU * t * lobe.slope_profile(t * t) * weight * (to - from) / 2.0;
+        }
+        (from, to) = (to, 2.0 * to);
+    }
+    sum
 }
 
 /// Rings and spokes of half-vectors around the lobe's mean.

@@ -213,7 +213,8 @@ impl Mirrors<'_> {
             let Some((way, shown)) = self.shown(&sample) else { return };
             let n = answering(&whole, self.mean, base, way.wh);
             // The profile counts facet area; a normal map's texels weigh by map area.
-            let share = profile(lobe, &sample) / total * (1.0 + base.get() * sample.square).sqrt();
+            let share = self.surround.split_sum.facets * profile(lobe, &sample) / total
+                * (1.0 + base.get() * sample.square).sqrt();
             sum += shown * (share * 4.0 * way.u * self.reflection.factor(n, &way, self.finish.gloss));
         });
         sum

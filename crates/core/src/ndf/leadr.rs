@@ -171,6 +171,12 @@ impl SlopeGrid {
         self.drawn
     }
 
+    /// Weight of a slope in the very middle.
+    pub(super) fn middle_weight(&self) -> f64 {
+        let (p, weight) = self.points[0];
+        (weight / (-0.5 * p * p).exp()).powi(2)
+    }
+
     /// A point in deviations, its weight, and the side of the square that it stands for.
     fn point(&self, i: usize) -> (DVec2, f64, f64) {
         if !self.drawn {

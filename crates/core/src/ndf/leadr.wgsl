@@ -1,6 +1,6 @@
 // LEADR: what a displaced surface sends to the eye, when its slopes are a Gaussian. Twin of leadr.rs.
 //
-// Diffuse facets are averaged over GRID × GRID slopes, GRID_STEP deviations apart.
+// Diffuse facets are averaged over GRID × GRID slopes: GRID_STEP deviations apart, or (GRID_DRAWN) drawn at random.
 
 // Weight of the artificial normal that keeps silhouettes defined.
 const ARTIFICIAL_WEIGHT: f32 = 1e-5;
@@ -59,6 +59,34 @@ fn artificial_normal(g: Decoded, wo: vec3<f32>) -> vec4<f32> {
     return vec4<f32>(n, max(dot(n, wo), LEAST_VISIBLE));
 }
 
+// A number that is as good as random for each other number (the permuted congruential generator of O'Neill 2014, as a hash).
+fn slope_hash(v: u32) -> u32 {
+    let state = v * 747796405u + 2891336453u;
+    let word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
+    return (word >> 22u) ^ word;
+}
+
+// A slope of the grid: its place in deviations, its weight (all of them add up to one), and the side of the square that it stands for.
+fn slope_point(i: u32) -> vec4<f32> {
+    if GRID_DRAWN {
+        let u = (f32(slope_hash(2u * i) >> 8u) + 0.5) / 16777216.0;
+        let v = (f32(slope_hash(2u * i + 1u) >> 8u) + 0.5) / 16777216.0;
+        let radius = sqrt(-2.0 * log(u));
+        let share = 1.0 / f32(GRID * GRID);
+        return vec4<f32>(radius * cos(2.0 * PI * v), radius * sin(2.0 * PI * v), share, sqrt(2.0 * PI / u * share));
+    }
+    let at = GRID_STEP * (vec2<f32>(f32(i / GRID), f32(i % GRID)) - 0.5 * f32(GRID - 1u));
+    return vec4<f32>(at, GRID_WEIGHT * exp(-0.5 * dot(at, at)), GRID_STEP);
+}
+
+// The normal of a slope of the grid, over its z.
+fn leaning(g: Decoded, at: vec2<f32>) -> vec3<f32> {
+    let deviation = sqrt(g.covariance.x);
+    let shear = select(0.0, g.covariance.z / deviation, deviation > 0.0);
+    let rest = sqrt(max(g.covariance.y - shear * shear, 0.0));
+    return vec3<f32>(-g.mean - vec2<f32>(deviation * at.x, shear * at.x + rest * at.y), 1.0);
+}
+
 // What shadows take: `a(wo) Lambda(wi)`; below zero where all is in shadow.
 fn shadow(reflection: Reflection, g: Decoded, way: Way) -> f32 {
     if reflection.model != SHADOWED {
@@ -99,29 +127,18 @@ fn displaced_diffuse(reflection: Reflection, g: Decoded, way: Way) -> f32 {
     if shadow < 0.0 {
         return 0.0;
     }
-    let deviation = sqrt(g.covariance.x);
-    let shear = select(0.0, g.covariance.z / deviation, deviation > 0.0);
-    let rest = sqrt(max(g.covariance.y - shear * shear, 0.0));
-    let middle = 0.5 * f32(GRID - 1u);
     var lit = 0.0;
     var seen = 0.0;
-    var total = 0.0;
-    for (var i = 0u; i < GRID; i++) {
-        let p = GRID_STEP * (f32(i) - middle);
-        for (var j = 0u; j < GRID; j++) {
-            let q = GRID_STEP * (f32(j) - middle);
-            let weight = exp(-0.5 * (p * p + q * q));
-            // n / n.z
-            let n = vec3<f32>(-g.mean - vec2<f32>(deviation * p, shear * p + rest * q), 1.0);
-            let visible = weight * max(dot(n, way.wo), 0.0);
-            total += weight;
-            seen += visible;
-            lit += visible * max(dot(n, way.wi), 0.0) * inverseSqrt(dot(n, n));
-        }
+    for (var i = 0u; i < GRID * GRID; i++) {
+        let point = slope_point(i);
+        let n = leaning(g, point.xy);
+        let visible = point.z * max(dot(n, way.wo), 0.0);
+        seen += visible;
+        lit += visible * max(dot(n, way.wi), 0.0) * inverseSqrt(dot(n, n));
     }
     let artificial = artificial_normal(g, way.wo);
-    let visible = ARTIFICIAL_WEIGHT * artificial.w * total;
-    return (lit + visible * max(dot(artificial.xyz, way.wi), 0.0)) / (seen + visible + shadow * total);
+    let visible = ARTIFICIAL_WEIGHT * artificial.w;
+    return (lit + visible * max(dot(artificial.xyz, way.wi), 0.0)) / (seen + visible + shadow);
 }
 
 // Light that a filtered texel of a displaced surface sends along the way, per unit of irradiance; `by` is how slopes of the map lie on it.

@@ -33,7 +33,7 @@ fn together(reflection: Reflection, finish: Finish, way: Way, specular: f32, dif
         return lambert;
     }
     let f = fresnel(reflection.model, finish.specular, way.u);
-    return f * max(specular, 0.0) + diffuse_share(reflection.model, f) * lambert;
+    return brdf_tint(way.u) * f * max(specular, 0.0) + diffuse_share(reflection.model, f) * lambert;
 }
 
 // What a layer's lobe is made of: what it carries, or `plain` where lobes carry nothing.

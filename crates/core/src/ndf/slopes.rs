@@ -254,6 +254,7 @@ impl Representation for Slopes {
         ])
         .constant("GRID", self.grid.len() as u32)
         .constant("GRID_STEP", SlopeGrid::step(self.grid.len()) as f32)
+        .constant("GRID_WEIGHT", self.grid.middle_weight() as f32)
         .constant("GRID_LEVEL", self.grid.level_offset() as f32)
         .constant("GRID_DRAWN", self.grid.is_drawn())
         .displaces()

@@ -35,8 +35,9 @@ use crate::grid::Size;
 use crate::light::Light;
 use crate::light::environment::Surroundings;
 use crate::procedural;
-use crate::reflection::{Model, Reflection};
+use crate::reflection::{Finish, Model, Reflection};
 use crate::surface::Surface;
+use crate::units::SlopeVariance;
 
 /// A mesh of one material.
 #[derive(Clone, Debug)]
@@ -131,19 +132,22 @@ pub fn find(name: &str) -> Option<&'static Row> {
 }
 
 impl Scene {
-    /// Gives every material this lobe. A diffuse one leaves no highlight: what was specular colour becomes albedo.
-    ///
-    /// # Errors
-    /// [`brdf::ParseBrdfError`] for a spelling that names none.
-    pub fn set_brdf(&mut self, spelling: &str) -> Result<(), brdf::ParseBrdfError> {
+    /// Gives every material this lobe. A diffuse one leaves no highlight: what was specular colour becomes albedo. One that was measured
+    /// brings its own colours, and Han et al.'s model, with which it is what was measured.
+    pub fn set_brdf(&mut self, lobe: &dyn Brdf) {
         for material in &mut self.materials {
-            material.reflection.lobe = brdf::parse(spelling)?;
+            material.reflection.lobe = lobe.widen(SlopeVariance::ZERO);
+            if let Some(measured) = lobe.measured() {
+                material.finish =
+                    Finish { diffuse: measured.diffuse, specular: DVec3::ONE, ..material.finish };
+                material.finish_map = None;
+                material.reflection.model = Model::Han;
+            }
             if material.reflection.lobe.argument() == Argument::Light {
                 material.finish.diffuse = material.finish.diffuse.max(material.finish.specular);
                 material.finish_map = material.finish_map.take().map(FinishMap::without_highlight);
             }
         }
-        Ok(())
     }
 
     /// Gives every material this shading model.

@@ -38,9 +38,13 @@ fn shade(place: Place, channels: ptr<function, Channels>, plain: Finish) -> vec3
         if relief {
             let light_of = reflect_displaced(channels, &decoded, plain, material.reflection, way, place.stretch);
             sum += light.irradiance * light_of;
-        } else if light.wi.z > 0.0 {
+        } else if light.wi.z > 0.0 || light.from_below {
             sum += light.irradiance * reflect_texel(channels, &decoded, plain, material.reflection, way);
         }
+    }
+    if environment.technique > 0u {
+        let around = Around(environment.turn * place.frame, place.wo, relief, place.stretch);
+        sum += reflect_surround(channels, &decoded, plain, material.reflection, around);
     }
     return sum;
 }

@@ -30,7 +30,8 @@ struct View {
 struct Light {
     // Unit vector to the light (w = 0), or where it is (w = 1).
     place: vec4<f32>,
-    // Irradiance on a plane that faces it, or radiant intensity.
+    // Irradiance on a plane that faces it, or radiant intensity. w = 1: of an environment, whose light normals see from below the base
+    // surface, too.
     power: vec4<f32>,
 }
 
@@ -136,14 +137,15 @@ fn place_of(in: Varying, unbent: bool) -> Place {
 struct Seen {
     wi: vec3<f32>,
     irradiance: vec3<f32>,
+    from_below: bool,
 }
 
 fn seen_from(place: Place, i: u32) -> Seen {
     let light = lights[i];
     if light.place.w == 0.0 {
-        return Seen(light.place.xyz * place.frame, light.power.xyz);
+        return Seen(light.place.xyz * place.frame, light.power.xyz, light.power.w == 1.0);
     }
     let way = light.place.xyz - place.position;
     let square = max(dot(way, way), 1e-12);
-    return Seen(way * inverseSqrt(square) * place.frame, light.power.xyz / square);
+    return Seen(way * inverseSqrt(square) * place.frame, light.power.xyz / square, false);
 }

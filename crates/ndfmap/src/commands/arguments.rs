@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use ndfmap_core::brdf::{self, ParseBrdfError};
+use ndfmap_core::brdf::{self, Brdf, Factors, ParseBrdfError};
 use ndfmap_core::grid::Size;
 use ndfmap_core::light::environment::{Surroundings, Technique, builtin};
 use ndfmap_core::ndf::{self, Method, ParseMethodError};
@@ -13,6 +13,7 @@ use ndfmap_core::scene;
 use ndfmap_core::surface::{SlopeFilter, Wrap, Wraps};
 use ndfmap_maps::SourceKind;
 use ndfmap_maps::environment::read_environment;
+use ndfmap_maps::merl::read_merl;
 use ndfmap_maps::model::is_model;
 use ndfmap_maps::source::{Convention, DEFAULT_HEIGHT_SCALE, SourceOptions};
 
@@ -221,13 +222,46 @@ pub(super) fn method_spelling(text: &str) -> Result<String, String> {
     }
 }
 
-/// Checks a BRDF's spelling; an unknown one suggests the nearest.
+/// What a file of measurements is spelled with.
+const MERL: &str = "merl:";
+
+/// Checks a BRDF's spelling; an unknown one suggests the nearest. Files are for [`read_brdf`] to check.
 pub(super) fn brdf_spelling(text: &str) -> Result<String, String> {
+    if text.strip_prefix(MERL).is_some_and(|file| !file.is_empty()) {
+        return Ok(text.to_owned());
+    }
     match brdf::parse(text) {
         Ok(_) => Ok(text.to_owned()),
-        Err(ParseBrdfError::Unknown(name)) => Err(unknown(&name, brdf::TABLE.iter().map(|r| r.name))),
+        Err(ParseBrdfError::Unknown(name)) => {
+            Err(unknown(&name, brdf::TABLE.iter().map(|r| r.name).chain(["merl"])))
+        }
         Err(other) => Err(other.to_string()),
     }
+}
+
+/// The lobe of a checked spelling. Of one that was measured it is said what its factors leave.
+pub(super) fn read_brdf(spelling: &str) -> Result<Box<dyn Brdf>, crate::Failure> {
+    let lobe: Box<dyn Brdf> = match spelling.strip_prefix(MERL) {
+        Some(file) => {
+            let (lobe, missing) = read_merl(file.as_ref())?;
+            if missing > 0 {
+                super::warn(
+                    file.as_ref(),
+                    &format!("{missing} values are negative or no number, and left out"),
+                );
+            }
+            Box::new(lobe)
+        }
+        None => brdf::parse(spelling).map_err(|e| crate::Failure::Usage(e.to_string()))?,
+    };
+    if let Some(Factors { residual, kernels, .. }) = lobe.measured() {
+        let [factored, fitted] = [residual.factored, residual.fitted].map(|left| 100.0 * left);
+        eprintln!(
+            "ndfmap: {spelling}: kd + f(theta_h) g(theta_d) leaves {factored:.1} % of the table, and f as {} kernels {fitted:.1} %",
+            kernels.len()
+        );
+    }
+    Ok(lobe)
 }
 
 /// Checks the name of a scene; what is neither built in nor named like a model suggests the nearest.
@@ -271,7 +305,8 @@ fn builtin_help() -> String {
 /// Every BRDF with its parameter and summary, for `--help`.
 pub(super) fn brdfs_help() -> String {
     let rows = brdf::TABLE.iter().map(|r| format!("  {}{}\n      {}", r.name, r.parameter, r.summary));
-    format!("BRDFs:\n{}", rows.collect::<Vec<_>>().join("\n"))
+    let merl = "  merl:FILE\n      a file of measurements in the MERL format (.binary), factored, in its own colours".to_owned();
+    format!("BRDFs:\n{}", rows.chain([merl]).collect::<Vec<_>>().join("\n"))
 }
 
 /// The method of a checked spelling.

@@ -5,7 +5,6 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use ndfmap_core::bake::{Bake as CoreBake, BakeReport, MemorySink};
-use ndfmap_core::brdf;
 use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid;
 use ndfmap_maps::attribute::{AttributeMap, Transfer, read_attribute};
@@ -17,6 +16,7 @@ use serde_json::json;
 
 use super::arguments::{
     BuiltinSize, Precision, SourceArguments, brdf_spelling, method, method_spelling, methods_help, positive,
+    read_brdf,
 };
 use super::{print, print_json, say_if_replaced, warn};
 use crate::Failure;
@@ -152,7 +152,7 @@ impl Bake {
             (None, Some(bytes)) => Limit::Bytes(bytes as usize),
             (None, None) => unreachable!("checked before the map was read"),
         };
-        let brdf = brdf::parse(&self.brdf).map_err(|e| Failure::Usage(e.to_string()))?;
+        let brdf = read_brdf(&self.brdf)?;
         let asked = Auto {
             surface: &*map.surface,
             brdf: &*brdf,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
-use ndfmap_core::brdf;
+use ndfmap_core::brdf::Brdf;
 use ndfmap_core::grid::Size;
 use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid;
@@ -14,7 +14,7 @@ use ndfmap_trace::truth::Effort;
 
 use super::arguments::{
     BuiltinSize, EnvironmentArguments, Precision, SourceArguments, brdf_spelling, brdfs_help, method,
-    method_spelling, methods_help, scene_name, size,
+    method_spelling, methods_help, read_brdf, scene_name, size,
 };
 use super::render::{DisplaceArguments, FilterArguments, check_drift};
 use super::{print, print_json, say_if_replaced, warn};
@@ -93,17 +93,18 @@ impl Compare {
             warn(&self.map, warning);
         }
         let environment = self.environment.read()?;
+        let brdf: Arc<dyn Brdf> = read_brdf(&self.brdf)?.into();
         let run = Run {
             map: &map,
             methods: &methods,
-            brdf: &self.brdf,
+            brdf: &*brdf,
             precision: self.precision.into(),
             filtering: self.filtering,
             pictures: self.scene.as_ref().map(|scene| Pictures {
                 stage: Stage {
                     scene: scene.clone(),
                     map: Some(Arc::clone(&map.surface)),
-                    brdf: Some(self.brdf.clone()),
+                    brdf: Some(Arc::clone(&brdf)),
                     displacement: self.displace.displacement(),
                     environment: environment.clone(),
                     ..Stage::default()
@@ -139,7 +140,7 @@ impl Compare {
 pub(super) struct Run<'a> {
     pub(super) map: &'a SourceMap,
     pub(super) methods: &'a [Box<dyn Method>],
-    pub(super) brdf: &'a str,
+    pub(super) brdf: &'a dyn Brdf,
     pub(super) precision: pyramid::Precision,
     pub(super) filtering: bool,
     pub(super) pictures: Option<Pictures>,
@@ -169,11 +170,10 @@ impl Run<'_> {
         if let Some(folder) = folder {
             std::fs::create_dir_all(folder).map_err(|e| ndfmap_maps::MapError::io(folder, e))?;
         }
-        let brdf = brdf::parse(self.brdf).map_err(|e| Failure::Usage(e.to_string()))?;
         let reel = self.pictures.as_ref().map(|pictures| self.shoot(pictures)).transpose()?;
         let subject = Subject {
             surface: &*self.map.surface,
-            brdf: &*brdf,
+            brdf: self.brdf,
             methods: self.methods,
             precision: self.precision,
             filtering: self.filtering,

@@ -13,7 +13,7 @@ use ndfmap_maps::source::{SourceOptions, read_source};
 use ndfmap_trace::filtered::Lookups;
 use ndfmap_trace::truth::Effort;
 
-use super::arguments::method;
+use super::arguments::{method, read_brdf};
 use super::bake::header_of;
 use super::compare::{DEFAULT_METHODS, Measured, Run};
 use super::{print, print_json, say_if_replaced};
@@ -73,7 +73,7 @@ impl Demo {
         let run = Run {
             map: &map,
             methods: &methods,
-            brdf: BRDF,
+            brdf: &*read_brdf(BRDF)?,
             precision: Precision::Half,
             filtering: false,
             pictures: None,

@@ -23,7 +23,7 @@ use serde_json::json;
 
 use super::arguments::{
     EnvironmentArguments, Precision, SourceArguments, brdf_spelling, brdfs_help, environments_help, method,
-    method_spelling, methods_help, model, positive, scene_name, size,
+    method_spelling, methods_help, model, positive, read_brdf, scene_name, size,
 };
 use super::{print, print_json, say_if_replaced, warn};
 use crate::Failure;
@@ -404,7 +404,8 @@ impl Render {
     ) -> Result<Reel, Failure> {
         #[cfg(feature = "gpu")]
         if let Some(device) = self.device.open()? {
-            let shot_there = shoot(&Gpu::new(&device, self.sampler, self.multisample), shot, each);
+            let gpu = Gpu::new(&device, self.sampler, self.multisample);
+            let shot_there = gpu.and_then(|gpu| shoot(&gpu, shot, each));
             match shot_there {
                 // What this GPU cannot do, the processor can; `auto` asked for no more than a picture.
                 Err(Failure::Failed(why)) if self.device == Device::Auto => {
@@ -451,7 +452,7 @@ impl Render {
             scene: self.scene.clone(),
             map,
             map_size: self.map_size,
-            brdf: self.brdf.clone(),
+            brdf: self.brdf.as_deref().map(read_brdf).transpose()?.map(Arc::from),
             model: self.model,
             camera: self.camera,
             lights: self.light.clone(),

@@ -3,12 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use ndfmap_core::brdf;
 use ndfmap_core::reflection::{Model, Reflection};
 use ndfmap_gpu::export::{Export, Language, TABLE};
 use serde_json::json;
 
-use super::arguments::{brdf_spelling, brdfs_help, method, method_spelling, methods_help, model};
+use super::arguments::{brdf_spelling, brdfs_help, method, method_spelling, methods_help, model, read_brdf};
 use super::{print_bytes, print_json, say_if_replaced};
 use crate::Failure;
 
@@ -50,7 +49,7 @@ fn language(text: &str) -> Result<&'static str, String> {
 impl Shader {
     pub(super) fn run(self, json: bool) -> Result<(), Failure> {
         let method = method(&self.method)?;
-        let lobe = brdf::parse(&self.brdf).map_err(|e| Failure::Usage(e.to_string()))?;
+        let lobe = read_brdf(&self.brdf)?;
         let reflection = Reflection { lobe, model: self.model };
         let language = find(self.lang).unwrap_or(&TABLE[0]);
         let bytes = Export { method: &*method, reflection: &reflection }.to(language)?;

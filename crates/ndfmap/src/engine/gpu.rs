@@ -36,9 +36,9 @@ impl From<GpuError> for Failure {
 
 impl<'a> Gpu<'a> {
     /// Prepares to draw on a device.
-    pub(crate) fn new(device: &'a Device, sampler: Option<u16>, multisample: bool) -> Self {
+    pub(crate) fn new(device: &'a Device, sampler: Option<u16>, multisample: bool) -> Result<Self, Failure> {
         let outlines = if multisample { Outlines::Multisampled } else { Outlines::Parts };
-        Self { device, renderer: Renderer::new(device), sampler, outlines }
+        Ok(Self { device, renderer: Renderer::new(device)?, sampler, outlines })
     }
 
     fn shown<'v>(view: &'v View<'_, Geometry>) -> Shown<'v> {
@@ -83,8 +83,8 @@ impl Engine for Gpu<'_> {
         effort: &truth::Effort,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<TruePicture, Failure> {
-        if view.scene.has_relief() {
-            // Facets of relief are rays' business.
+        if view.scene.has_relief() || view.scene.surroundings.is_some() {
+            // Facets of relief are rays' business, and so is light that is drawn by chance.
             let geometry = TrueGeometry::new(view.scene);
             return Ok(geometry.truth(view.scene).render(&view.camera, view.size, effort, progress));
         }

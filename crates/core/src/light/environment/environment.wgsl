@@ -1,0 +1,26 @@
+// An environment as shading looks it up. Twin of filtered.rs.
+//
+// A host brings `environment`, a uniform; `environment_radiance` and `environment_blurred`, the cubes, as functions of a direction and a
+// level; `half_vector_coefficient`, of a view and an index; and `split_sum_texel`, of a column and a row.
+
+// Techniques, as numbered by `Technique::index`; 0 is no environment.
+const PREFILTERED: u32 = 1u;
+const HARMONICS: u32 = 2u;
+
+struct Environment {
+    // From directions of the world to the environment's own.
+    turn: mat3x3<f32>,
+    // Nine harmonics of its light, small bright sources apart.
+    irradiance: array<vec4<f32>, 9>,
+    // Texels on a side of the cubes' finest level, and how many levels there are.
+    size: vec2<f32>,
+    // What the cubes' texels are times.
+    scale: f32,
+    // PREFILTERED, HARMONICS, or 0.
+    technique: u32,
+}
+
+// The level of a blurred cube that is as wide as a lobe: its perceptual roughness.
+fn blurred_level(width: f32) -> f32 {
+    return min(sqrt(sqrt(2.0 * width)), 1.0) * (environment.size.y - 1.0);
+}

@@ -1,0 +1,68 @@
+// Light over half-vectors: Han et al. 2007, section 8, equation 26. Twin of half_vectors.rs.
+
+const HALF_VECTOR_ORDER: u32 = 8u;
+
+// Views on each axis of the grid.
+const VIEWS: u32 = 16u;
+
+// The four views around a direction, and what each counts.
+struct ViewsAround {
+    views: vec4<u32>,
+    weights: vec4<f32>,
+}
+
+fn views_around(wo: vec3<f32>) -> ViewsAround {
+    let turn = atan2(wo.x, -wo.z) / (2.0 * PI);
+    let around = (turn - floor(turn)) * f32(VIEWS);
+    let down = acos(clamp(wo.y, -1.0, 1.0)) / PI * f32(VIEWS - 1u);
+    let i = u32(around) % VIEWS;
+    let j = min(u32(down), VIEWS - 2u);
+    let next = (i + 1u) % VIEWS;
+    let x = fract(around);
+    let y = down - f32(j);
+    let views = vec4<u32>(j * VIEWS + i, j * VIEWS + next, (j + 1u) * VIEWS + i, (j + 1u) * VIEWS + next);
+    return ViewsAround(views, vec4<f32>((1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y));
+}
+
+// A coefficient, between views.
+fn half_vector_between(around: ViewsAround, i: u32) -> vec3<f32> {
+    return half_vector_coefficient(around.views.x, i) * around.weights.x
+        + half_vector_coefficient(around.views.y, i) * around.weights.y
+        + half_vector_coefficient(around.views.z, i) * around.weights.z
+        + half_vector_coefficient(around.views.w, i) * around.weights.w;
+}
+
+// The series for a lobe of this spread around `mu`, for an eye in direction `wo`. What rings below zero is held there.
+fn over_half_vectors(wo: vec3<f32>, mu: vec3<f32>, spread: f32, printed: bool) -> vec3<f32> {
+    let around = views_around(wo);
+    var sum = vec3<f32>(0.0);
+    // (cos m phi, sin m phi) sin^m theta = Re, Im of (x + iy)^m.
+    var power = vec2<f32>(1.0, 0.0);
+    var diagonal = sqrt(1.0 / (4.0 * PI));
+    for (var m = 0u; m <= HALF_VECTOR_ORDER; m++) {
+        let mf = f32(m);
+        if m > 0u {
+            diagonal *= sqrt((2.0 * mf + 1.0) / (2.0 * mf));
+        }
+        var before = 0.0;
+        var now = diagonal * select(1.0, sqrt(2.0), m > 0u);
+        var ratio = 1.0;
+        for (var l = m; l <= HALF_VECTOR_ORDER; l++) {
+            let i = l * l + l;
+            let rate = f32(l * select(l + 1u, l, printed));
+            let zonal = split_sum_texel(l, SPLIT_SUM_ENTRIES).x * exp(-0.5 * rate * spread);
+            var c = half_vector_between(around, i + m) * power.x;
+            if m > 0u {
+                c += half_vector_between(around, i - m) * power.y;
+            }
+            sum += zonal * now * c;
+            let next = sh_ratio(f32(l) + 1.0, mf);
+            let after = next * mu.z * now - select(0.0, next / ratio, l > m) * before;
+            before = now;
+            now = after;
+            ratio = next;
+        }
+        power = vec2<f32>(power.x * mu.x - power.y * mu.y, power.x * mu.y + power.y * mu.x);
+    }
+    return max(sum, vec3<f32>(0.0));
+}

@@ -1,0 +1,35 @@
+// What a lobe reflects of light that is the same from everywhere. Twin of split_sum.rs.
+
+// Entries of the table on each axis. The row below them has the lobe's zonal coefficients, and in its first texel what facets it has.
+const SPLIT_SUM_ENTRIES: u32 = 16u;
+
+struct Reflected {
+    // Times the specular colour.
+    scale: vec3<f32>,
+    // Whatever the specular colour is.
+    bias: f32,
+    // The lobe alone.
+    lobe: f32,
+    // The mean of Fresnel's rise over the diffuse part.
+    rise: f32,
+}
+
+// What normals of this spread reflect to an eye at this cosine to their mean.
+fn split_sum(cosine: f32, spread: f32) -> Reflected {
+    let last = f32(SPLIT_SUM_ENTRIES - 1u);
+    let x = clamp(cosine, 0.0, 1.0) * last;
+    let y = sqrt(clamp(spread, 0.0, 1.0)) * last;
+    let i = min(u32(x), SPLIT_SUM_ENTRIES - 2u);
+    let j = min(u32(y), SPLIT_SUM_ENTRIES - 2u);
+    let part = vec2<f32>(x - f32(i), y - f32(j));
+    let a = mix(mix(split_sum_texel(2u * i, j), split_sum_texel(2u * i + 2u, j), part.x),
+        mix(split_sum_texel(2u * i, j + 1u), split_sum_texel(2u * i + 2u, j + 1u), part.x), part.y);
+    let b = mix(mix(split_sum_texel(2u * i + 1u, j), split_sum_texel(2u * i + 3u, j), part.x),
+        mix(split_sum_texel(2u * i + 1u, j + 1u), split_sum_texel(2u * i + 3u, j + 1u), part.x), part.y);
+    return Reflected(a.xyz, a.w, b.x, b.y);
+}
+
+// What is left for the diffuse part of a material of this specular colour.
+fn reflected_diffuse_share(model: u32, rise: f32, specular: vec3<f32>) -> vec3<f32> {
+    return select(1.0 - specular - (1.0 - specular) * rise, vec3<f32>(1.0), model == HAN);
+}
