@@ -5,7 +5,9 @@
 mod common;
 
 use common::device;
+use ndfmap_core::brdf;
 use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::light::environment::{Surroundings, Technique, builtin};
 use ndfmap_core::lookup::Filtering;
 use ndfmap_core::metrics::{Picture, display, relative_l2};
 use ndfmap_core::ndf;
@@ -213,5 +215,87 @@ fn displaced_scenes_are_the_cpus() {
             // Triangles are of a few pixels, and so edges are many.
             assert!(share < 5.0 * MAY_DIFFER, "{name} {spelling}: {share}");
         }
+    }
+}
+
+/// The shares of pixels that are off, of a scene by a method on both devices.
+fn off_by(device: &ndfmap_gpu::Device, scene: &Scene, spelling: &str, size: Size) -> f64 {
+    let (renderer, method) = (Renderer::new(device).unwrap(), ndf::parse(spelling).unwrap());
+    let canvas = Canvas::new(device, size, Outlines::Parts).unwrap();
+    let ours = Maps::new(device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
+    let theirs = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
+    let on_cpu = ndfmap_trace::Geometry::displaced(scene, &scene.camera, size);
+    let on_gpu = Meshes::new(device, scene).unwrap().cut(&scene.camera, size).unwrap();
+    let shown = Shown { scene, geometry: &on_gpu, camera: &scene.camera };
+    let traced = Filtered { scene, geometry: &on_cpu, maps: &theirs, progress: &|_| () };
+    let filtering = Filtering::anisotropic(4);
+    let lookups = Lookups { sampling: Sampling::Taps(filtering), neighbours: false, at_means: false };
+    renderer.draw(&canvas, &shown, &ours, lookups).unwrap();
+    let lookups = filtered::Lookups { filtering, neighbours: false, at_means: false };
+    off(&canvas.read().unwrap(), &traced.render(&scene.camera, size, lookups), scene.exposure)
+}
+
+/// Lit by a built-in environment alone, turned, at an exposure that shows it.
+fn surrounded(mut scene: Scene, environment: &str, technique: Technique) -> Scene {
+    let built = builtin::find(environment).unwrap().build();
+    scene.lights.clear();
+    scene.surroundings = Some(Surroundings { technique, turn: 0.7, ..Surroundings::new(built) });
+    scene.exposure = 0.8;
+    scene
+}
+
+#[test]
+fn environments_light_as_on_the_cpu() {
+    let Some(device) = device() else { return };
+    let size = Size { width: 120, height: 100 };
+    let methods = ndf::TABLE.iter().map(|row| row.samples[0]);
+    let cases =
+        methods.chain(["sh:7", "slopes:9", "slopes:9:drawn"]).enumerate().flat_map(|(at, spelling)| {
+            let environment = ["studio", "sky"][at % 2];
+            Technique::ALL.map(|technique| (spelling, environment, technique))
+        });
+    let mut failed = Vec::new();
+    for (spelling, environment, technique) in cases {
+        let scene = surrounded(staged("disk", 0.4, 128), environment, technique);
+        let share = off_by(&device, &scene, spelling, size);
+        eprintln!("{spelling} {environment} {}: {share:.5} off", technique.name());
+        // Twice as many as without an environment: samplers keep eight bits of where between two texels they are, which edges of lamps show.
+        if share > 2.0 * MAY_DIFFER {
+            failed.push((spelling, environment, technique, share));
+        }
+    }
+    assert!(failed.is_empty(), "{failed:?}");
+}
+
+#[test]
+fn every_lobe_is_lit_by_environments_as_on_the_cpu() {
+    let Some(device) = device() else { return };
+    let size = Size { width: 120, height: 100 };
+    let mut failed = Vec::new();
+    for (at, lobe) in brdf::TABLE.iter().map(|row| row.samples[0]).enumerate() {
+        for spelling in ["vmf:4", "slopes"] {
+            let mut scene = surrounded(staged("sphere", 0.0, 128), "studio", Technique::ALL[at % 2]);
+            scene.set_brdf(&*brdf::parse(lobe).unwrap());
+            let share = off_by(&device, &scene, spelling, size);
+            eprintln!("{spelling} {lobe}: {share:.5} off");
+            if share > 2.0 * MAY_DIFFER {
+                failed.push((spelling, lobe, share));
+            }
+        }
+    }
+    assert!(failed.is_empty(), "{failed:?}");
+}
+
+#[test]
+fn displaced_surfaces_in_environments_are_lit_as_on_the_cpu() {
+    let Some(device) = device() else { return };
+    let size = Size { width: 120, height: 100 };
+    for (spelling, shadows) in [("slopes", false), ("slopes:9", true)] {
+        let mut scene = surrounded(staged("noise-sphere", 0.5, 128), "studio", Technique::Prefiltered);
+        scene.displace(1.0, shadows).unwrap();
+        let share = off_by(&device, &scene, spelling, size);
+        eprintln!("{spelling}: {share:.5} off");
+        // As displaced pictures under lights: edges of small triangles.
+        assert!(share < 5.0 * MAY_DIFFER, "{spelling}: {share}");
     }
 }
