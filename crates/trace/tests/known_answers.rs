@@ -2,9 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
 
+mod common;
+
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use common::{SQUARE, filtered, map, plate, truth};
 use glam::{DVec3, Vec3};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
@@ -19,58 +22,6 @@ use ndfmap_core::{brdf, ndf, procedural};
 use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
 use ndfmap_trace::truth::{Effort, TruePicture, Truth};
 use ndfmap_trace::{DRIFT_FRAMES, Geometry, drifted};
-
-const SQUARE: Size = Size { width: 4, height: 4 };
-
-fn map(name: &str, side: usize) -> Arc<dyn Surface> {
-    (procedural::find(name).unwrap().build)(Size::new(side, side).unwrap()).into()
-}
-
-/// A plane of side 2 at z = 0 that faces +z, seen from `distance` through an angle that just holds it.
-fn plate(surface: Arc<dyn Surface>, lobe: &str, model: Model, distance: f64) -> Scene {
-    let mesh =
-        Mesh::from_patch((1, 1), glam::DVec2::ONE, |s, t| DVec3::new(2.0 * s - 1.0, 2.0 * t - 1.0, 0.0));
-    let degrees = 2.0 * (1.0 / distance).atan().to_degrees();
-    Scene {
-        camera: Camera::new([0.0, 0.0, distance], [0.0; 3], degrees),
-        objects: vec![Object { mesh: mesh.into(), material: 0 }],
-        materials: vec![Material {
-            name: "plate".to_owned(),
-            surface,
-            finish: Finish {
-                diffuse: DVec3::new(0.4, 0.3, 0.2),
-                specular: DVec3::splat(0.1),
-                gloss: SlopeVariance::ZERO,
-            },
-            finish_map: None,
-            relief: None,
-            reflection: Reflection { lobe: brdf::parse(lobe).unwrap(), model },
-        }],
-        lights: vec![Light::Directional {
-            towards: DVec3::new(0.3, 0.2, 0.9).normalize(),
-            irradiance: DVec3::ONE,
-        }],
-        surroundings: None,
-        background: Vec3::ZERO,
-        exposure: 1.0,
-    }
-}
-
-fn truth(scene: &Scene, size: Size, rays: usize, seed: u64) -> TruePicture {
-    let geometry = Geometry::new(scene);
-    Truth::new(scene, &geometry).render(&scene.camera, size, &Effort { rays, noise: 0.0, seed }, &|_| ())
-}
-
-fn filtered(scene: &Scene, method: &str, size: Size, lookups: Lookups) -> Picture {
-    let geometry = Geometry::new(scene);
-    let method = ndf::parse(method).unwrap();
-    let maps = BakedMaps::new(&scene.materials, &*method, Precision::Single, &|_| ());
-    Filtered { scene, geometry: &geometry, maps: &maps, progress: &|_| () }.render(
-        &scene.camera,
-        size,
-        lookups,
-    )
-}
 
 /// Mean over all texels of what they reflect, for one way: what a whole map far away looks like.
 fn mean_over_map(scene: &Scene, way: &Way) -> DVec3 {
