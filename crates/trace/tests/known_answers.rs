@@ -14,13 +14,12 @@ use ndfmap_core::light::Light;
 use ndfmap_core::lookup::Filtering;
 use ndfmap_core::metrics::{Picture, relative_l2};
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::reflection::{Finish, Model, Reflection, Way};
-use ndfmap_core::scene::{self, Camera, FinishMap, Material, Mesh, Object, Scene, Staging};
+use ndfmap_core::reflection::{Model, Way};
+use ndfmap_core::scene::{self, Camera, FinishMap, Mesh, Scene, Staging};
 use ndfmap_core::surface::{NormalGrid, Surface, SurfaceRow, Wraps};
-use ndfmap_core::units::SlopeVariance;
-use ndfmap_core::{brdf, ndf, procedural};
+use ndfmap_core::{ndf, procedural};
 use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
-use ndfmap_trace::truth::{Effort, TruePicture, Truth};
+use ndfmap_trace::truth::{Effort, Truth};
 use ndfmap_trace::{DRIFT_FRAMES, Geometry, drifted};
 
 /// Mean over all texels of what they reflect, for one way: what a whole map far away looks like.

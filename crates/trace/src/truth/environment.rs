@@ -9,14 +9,22 @@ use glam::{DMat3, DVec2, DVec3};
 use ndfmap_core::light::environment::{Environment, EnvironmentSampler, Kernel, Surroundings};
 use ndfmap_core::reflection::{Finish, Reflection, Way};
 use ndfmap_core::sphere::frame;
-use rand::RngExt;
-use rand_pcg::Pcg64Mcg;
 
 /// Where directions are drawn from.
 pub(super) struct Sky<'a> {
     environment: &'a Environment,
     sampler: EnvironmentSampler,
     to_environment: DMat3,
+}
+
+/// What the directions of one ray are drawn by: two numbers in [0, 1) for each kind.
+pub(super) type Numbers = [DVec2; 3];
+
+/// Numbers of a pixel's rays, one after the other spread more evenly than chance would have them: the sequence of Roberts 2018, of the
+/// plastic number, begun at random.
+pub(super) fn numbers(begin: [[f64; 2]; 3], ray: usize) -> Numbers {
+    const STEP: DVec2 = DVec2::new(0.754_877_666_246_692_8, 0.569_840_290_998_053_2);
+    begin.map(|at| (DVec2::from(at) + STEP * ray as f64).fract())
 }
 
 /// A facet that is lit: frame of the tangent space, in which all else is.
@@ -68,16 +76,10 @@ impl<'a> Sky<'a> {
     }
 
     /// An estimate of the light that a facet sends to the eye, of what comes from directions that are `open`.
-    pub(super) fn light(
-        &self,
-        shown: &Shown<'_>,
-        open: impl Fn(DVec3) -> bool,
-        random: &mut Pcg64Mcg,
-    ) -> DVec3 {
+    pub(super) fn light(&self, shown: &Shown<'_>, open: impl Fn(DVec3) -> bool, numbers: Numbers) -> DVec3 {
         let to_environment = self.to_environment * shown.frame;
         let specular = shown.reflection.is_specular();
-        let numbers: [[f64; 2]; 3] = random.random();
-        let [of_sky, of_cosine, of_lobe] = numbers.map(DVec2::from);
+        let [of_sky, of_cosine, of_lobe] = numbers;
         let from_sky = to_environment.transpose() * self.sampler.draw(self.environment, of_sky).0;
         let drawn = [
             Some(from_sky),

@@ -20,7 +20,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
-use self::environment::{Shown, Sky};
+use self::environment::{Numbers, Shown, Sky};
 use crate::drift;
 use crate::geometry::{Geometry, Place};
 use crate::relief::{Facet, Relief};
@@ -183,7 +183,11 @@ impl<'a> Truth<'a> {
                 let (x, y) = (i % width, first * drift::STEPS + i / width);
                 let mut random = Pcg64Mcg::seed_from_u64(mix([half, y as u64, x as u64]));
                 let corner = DVec2::new(x as f64, y as f64);
-                (0..each).map(|_| self.ray(&cell_rays, corner, 1.0, &mut random)).sum::<DVec3>() / each as f64
+                let mut ray = || {
+                    let numbers = self.sky.as_ref().map(|_| random.random()).unwrap_or_default();
+                    self.ray(&cell_rays, (corner, 1.0), environment::numbers(numbers, 0), &mut random)
+                };
+                (0..each).map(|_| ray()).sum::<DVec3>() / each as f64
             };
             let cells: Vec<DVec3> = (0..width * height).map(cell).collect();
             let rows = done.fetch_add(rows, Ordering::Relaxed) + rows;
@@ -202,16 +206,28 @@ impl<'a> Truth<'a> {
     /// Sum over one ray through each stratum of a pixel.
     fn pass(&self, rays: &Rays, pixel: DVec2, stream: [u64; 3]) -> DVec3 {
         let mut random = Pcg64Mcg::seed_from_u64(mix(stream));
+        // A pixel's own beginning, the same for all passes of one half.
+        let [seed, pass, at] = stream;
+        let begin = || Pcg64Mcg::seed_from_u64(mix([!seed, pass % 2, at])).random();
+        let begin = self.sky.as_ref().map(|_| begin()).unwrap_or_default();
+        let first = (pass / 2) as usize * STRATA * STRATA;
         let mut sum = DVec3::ZERO;
         for i in 0..STRATA * STRATA {
             let stratum = DVec2::new((i % STRATA) as f64, (i / STRATA) as f64) / STRATA as f64;
-            sum += self.ray(rays, pixel + stratum, 1.0 / STRATA as f64, &mut random);
+            let numbers = environment::numbers(begin, first + i);
+            sum += self.ray(rays, (pixel + stratum, 1.0 / STRATA as f64), numbers, &mut random);
         }
         sum
     }
 
     /// What comes along a ray through a square of the picture, at a place and of a width in pixels.
-    fn ray(&self, rays: &Rays, corner: DVec2, width: f64, random: &mut Pcg64Mcg) -> DVec3 {
+    fn ray(
+        &self,
+        rays: &Rays,
+        (corner, width): (DVec2, f64),
+        numbers: Numbers,
+        random: &mut Pcg64Mcg,
+    ) -> DVec3 {
         let [u, v, s, t]: [f64; 4] = random.random();
         let direction = rays.direction(corner + DVec2::new(u, v) * width);
         let plain = self.geometry.hit(rays.eye, direction);
@@ -220,12 +236,12 @@ impl<'a> Truth<'a> {
             && let Some(hit) = relief.hit(rays.eye, direction, limit)
         {
             let facet = relief.facet(&hit, direction);
-            return self.shade_facet(&facet, -direction, (DVec2::new(s, t) - 0.5, random));
+            return self.shade_facet(&facet, -direction, (DVec2::new(s, t) - 0.5, numbers));
         }
         match plain {
             Some(hit) => {
                 let place = self.geometry.place(&hit, direction, false);
-                self.shade(&place, -direction, (DVec2::new(s, t) - 0.5, random))
+                self.shade(&place, -direction, (DVec2::new(s, t) - 0.5, numbers))
             }
             None => self.scene.background.as_dvec3(),
         }
@@ -233,7 +249,7 @@ impl<'a> Truth<'a> {
 
     /// Light that a facet of relief sends to the eye, made of what the texel `displaced` from it is. Where facets shade each other, a light
     /// that something stands before adds nothing.
-    fn shade_facet(&self, facet: &Facet, eye: DVec3, (displaced, random): (DVec2, &mut Pcg64Mcg)) -> DVec3 {
+    fn shade_facet(&self, facet: &Facet, eye: DVec3, (displaced, numbers): (DVec2, Numbers)) -> DVec3 {
         let finest = &self.materials[facet.material];
         let (x, y) = finest.texel(facet.uv, displaced);
         let (reflection, finish) = (&finest.material.reflection, finest.finish(x, y));
@@ -256,7 +272,7 @@ impl<'a> Truth<'a> {
             let light = || Light::Directional { towards: frame * wi, irradiance: DVec3::ONE };
             !shadows || (wi.z > 0.0 && !self.in_shadow(facet, &light()))
         };
-        direct + self.sky.as_ref().map_or(DVec3::ZERO, |sky| sky.light(&shown, open, random))
+        direct + self.sky.as_ref().map_or(DVec3::ZERO, |sky| sky.light(&shown, open, numbers))
     }
 
     /// True where something stands between a facet and a light.
@@ -273,7 +289,7 @@ impl<'a> Truth<'a> {
     }
 
     /// Light that the texel `displaced` (in texels) from a place sends to the eye.
-    fn shade(&self, place: &Place, eye: DVec3, (displaced, random): (DVec2, &mut Pcg64Mcg)) -> DVec3 {
+    fn shade(&self, place: &Place, eye: DVec3, (displaced, numbers): (DVec2, Numbers)) -> DVec3 {
         let finest = &self.materials[place.material];
         let (x, y) = finest.texel(place.uv, displaced);
         let (material, finish) = (finest.material, finest.finish(x, y));
@@ -289,7 +305,7 @@ impl<'a> Truth<'a> {
             .map(|(way, irradiance)| irradiance * reflection.facet(n, &finish, &way))
             .sum();
         let shown = Shown { frame: place.frame, wo, n, finish: &finish, reflection };
-        direct + self.sky.as_ref().map_or(DVec3::ZERO, |sky| sky.light(&shown, |_| true, random))
+        direct + self.sky.as_ref().map_or(DVec3::ZERO, |sky| sky.light(&shown, |_| true, numbers))
     }
 }
 
