@@ -41,7 +41,15 @@ pub fn read_environment(path: &Path) -> Result<(Environment, Vec<String>), MapEr
         })?;
         return Ok((row.build(), Vec::new()));
     }
-    let image = read_image(path, &read_file(path)?)?;
+    parse_environment(path, &read_file(path)?)
+}
+
+/// [`read_environment`] of a file's bytes.
+///
+/// # Errors
+/// [`MapError`], as for a file.
+pub fn parse_environment(path: &Path, bytes: &[u8]) -> Result<(Environment, Vec<String>), MapError> {
+    let image = read_image(path, bytes)?;
     let (mut warnings, picture) = radiance(path, &image)?;
     let Size { width, height } = picture.size();
     let latitudes = if width == 2 * height {
