@@ -6,6 +6,7 @@
 use std::time::Instant;
 
 use ndfmap_core::grid::Size;
+use ndfmap_core::light::environment::{Surroundings, Technique, builtin};
 use ndfmap_core::lookup::Filtering;
 use ndfmap_core::metrics::{color_error, relative_l2};
 use ndfmap_core::ndf::{self, Method};
@@ -180,6 +181,39 @@ impl Bench<'_> {
         Ok(())
     }
 
+    /// Light from everywhere, by both techniques and by grids of slopes, over the scene's own lights with the same method.
+    fn surrounded(&self, name: &str, time: f64, size: Size) -> Outcome<()> {
+        let mut scene = staged(name, time, size)?;
+        let built = builtin::find("sky").ok_or("no such environment")?.build();
+        let surroundings = Surroundings::new(built);
+        let geometry = Geometry::new(self.device, &scene)?;
+        let canvas = Canvas::new(self.device, size, Outlines::Sharp)?;
+        let mut all = Vec::new();
+        for spelling in ["toksvig", "vmf:6", "slopes", "slopes:9", "slopes:32"] {
+            let method = ndf::parse(spelling)?;
+            let maps = |method| Maps::new(self.device, &scene.materials, method, Precision::Half, &|_| ());
+            all.push((spelling, maps(&*Box::leak(method))?));
+        }
+        let lights = std::mem::take(&mut scene.lights);
+        let mut columns = Vec::new();
+        for technique in [None, Some(Technique::Prefiltered), Some(Technique::Harmonics)] {
+            scene.lights = if technique.is_none() { lights.clone() } else { Vec::new() };
+            scene.surroundings =
+                technique.map(|technique| Surroundings { technique, ..surroundings.clone() });
+            let shown = Shown { scene: &scene, geometry: &geometry, camera: &scene.camera };
+            columns.push(self.times(&canvas, &shown, &all, Sampling::Sampler(1))?);
+        }
+        for (at, (spelling, _)) in all.iter().enumerate() {
+            let [lit, prefiltered, harmonics] = [columns[0][at], columns[1][at], columns[2][at]];
+            println!(
+                "{name} at {time}, {spelling}: {lit:.2} ms lit; in an environment, prefiltered {prefiltered:.2} ms ({:.2} times), harmonics {harmonics:.2} ms ({:.2} times)",
+                prefiltered / lit,
+                harmonics / lit
+            );
+        }
+        Ok(())
+    }
+
     fn creature(&self, size: Size) -> Outcome<()> {
         let scene = staged("creature", 0.3, size)?;
         let geometry = Geometry::new(self.device, &scene)?;
@@ -249,6 +283,9 @@ fn main() -> Outcome<()> {
         ("desert", 0.5),
     ] {
         bench.displaced(name, time, size)?;
+    }
+    for (name, time) in [("sphere", 0.0), ("armour", 0.5)] {
+        bench.surrounded(name, time, size)?;
     }
     for (name, time) in [("disk", 0.15), ("armour", 0.5)] {
         bench.methods(name, time, size)?;

@@ -7,6 +7,7 @@ mod common;
 use std::path::{Path, PathBuf};
 
 use common::{json, ndfmap, root};
+use ndfmap::maps::formats::read_image;
 use serde_json::Value;
 
 fn data() -> Option<PathBuf> {
@@ -170,4 +171,53 @@ fn a_damaged_colour_profile_does_not_matter() {
     let baked = ndfmap(&["bake", &map, "-o", &output, "--convention", "directx"]);
     assert!(baked.status.success());
     assert!(!String::from_utf8_lossy(&baked.stderr).contains("looks like"));
+}
+
+#[test]
+fn real_environments_light_without_black_or_burnt_pixels() {
+    let Some(data) = data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let maps = files(&data.join("env"));
+    assert_eq!(maps.len(), 7);
+    for map in maps {
+        let file = map.display().to_string();
+        for how in ["prefiltered", "harmonics"] {
+            let output = folder.path().join("lit.exr").display().to_string();
+            let told = json(&[
+                "render",
+                "--scene",
+                "sphere",
+                "--map-size",
+                "64",
+                "--size",
+                "48",
+                "--device",
+                "cpu",
+                "--environment",
+                &file,
+                "--environment-light",
+                how,
+                "--method",
+                "vmf:4",
+                "--truth",
+                "256",
+                "-o",
+                &output,
+                "--json",
+            ]);
+            let error = &told["methods"]["vmf:4"]["error"];
+            eprintln!("{file} {how}: {error}, noise {}", told["truth"]["noise"]);
+            // What it is is in the docs; here, that it is a picture of the same light.
+            assert!((error["brightness"].as_f64().unwrap() - 1.0).abs() < 0.05, "{file} {how}: {error}");
+            let picture = read_image(output.as_ref(), &std::fs::read(&output).unwrap()).unwrap();
+            let middle = |x: usize, y: usize| {
+                (0..3)
+                    .map(|c| picture.samples.get((y * 48 + x) * picture.channels + c))
+                    .fold(f32::INFINITY, f32::min)
+            };
+            for (x, y) in (12..36).flat_map(|y| (12..36).map(move |x| (x, y))) {
+                assert!(middle(x, y).is_finite() && middle(x, y) > 0.0, "{file} {how}: black at {x}, {y}");
+            }
+        }
+    }
 }

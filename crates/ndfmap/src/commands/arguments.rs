@@ -16,6 +16,7 @@ use ndfmap_maps::environment::read_environment;
 use ndfmap_maps::merl::read_merl;
 use ndfmap_maps::model::is_model;
 use ndfmap_maps::source::{Convention, DEFAULT_HEIGHT_SCALE, SourceOptions};
+use serde_json::json;
 
 use crate::staging::TurningEnvironment;
 
@@ -153,6 +154,20 @@ impl EnvironmentArguments {
     }
 }
 
+impl EnvironmentArguments {
+    /// What a script may want to know of it.
+    pub(super) fn to_json(&self, read: &TurningEnvironment) -> serde_json::Value {
+        let suns = &read.surroundings.filtered.suns;
+        json!({
+            "file": self.environment,
+            "technique": self.environment_light.name(),
+            "turn": read.turn.map(f64::to_degrees),
+            "suns": suns.lights.len(),
+            "suns_share": suns.share,
+        })
+    }
+}
+
 fn turn(text: &str) -> Result<[f64; 2], String> {
     let degrees = |t: &str| match t.parse::<f64>() {
         Ok(v) if v.abs() <= 1e6 => Ok(v),
@@ -227,7 +242,10 @@ const MERL: &str = "merl:";
 
 /// Checks a BRDF's spelling; an unknown one suggests the nearest. Files are for [`read_brdf`] to check.
 pub(super) fn brdf_spelling(text: &str) -> Result<String, String> {
-    if text.strip_prefix(MERL).is_some_and(|file| !file.is_empty()) {
+    if text == "merl" || text == MERL {
+        return Err("a file must follow, as in `merl:FILE`".to_owned());
+    }
+    if text.starts_with(MERL) {
         return Ok(text.to_owned());
     }
     match brdf::parse(text) {

@@ -390,7 +390,8 @@ impl Render {
             eprintln!("ndfmap: wrote {}", file.display());
         }
         if json {
-            print_json(&self.to_json(&reel, start.elapsed().as_secs_f64()))
+            let environment = stage.environment.as_ref().map(|e| self.environment.to_json(e));
+            print_json(&self.to_json(&reel, environment, start.elapsed().as_secs_f64()))
         } else {
             print(&reel.to_table())
         }
@@ -489,7 +490,12 @@ impl Render {
         Ok(())
     }
 
-    fn to_json(&self, reel: &Reel, seconds: f64) -> serde_json::Value {
+    fn to_json(
+        &self,
+        reel: &Reel,
+        environment: Option<serde_json::Value>,
+        seconds: f64,
+    ) -> serde_json::Value {
         let methods = reel.to_json();
         let first = &methods[&reel.methods[0]];
         let mut value = json!({
@@ -508,6 +514,9 @@ impl Render {
             value["truth"] = truth;
         }
         value["methods"] = methods.into();
+        if let Some(environment) = environment {
+            value["environment"] = environment;
+        }
         if let serde_json::Value::Object(engine) = &reel.engine {
             engine.iter().for_each(|(key, said)| value[key.as_str()] = said.clone());
         }

@@ -36,6 +36,12 @@ impl Engine for Cpu {
     }
 
     fn set(&self, scene: &Scene, size: Size) -> Result<Geometry, Failure> {
+        if let Some(surroundings) = &scene.surroundings {
+            // Made once, and no frame's time.
+            for material in &scene.materials {
+                surroundings.filtered.make(surroundings.technique, material.reflection.lobe.kernel());
+            }
+        }
         Ok(Geometry::displaced(scene, &scene.camera, size))
     }
 
