@@ -188,11 +188,14 @@ impl Bench<'_> {
         let surroundings = Surroundings::new(built);
         let geometry = Geometry::new(self.device, &scene)?;
         let canvas = Canvas::new(self.device, size, Outlines::Sharp)?;
+        let spellings = ["toksvig", "vmf:6", "slopes", "slopes:9", "slopes:32"];
+        let parsed = spellings.iter().map(|m| ndf::parse(m)).collect::<Result<Vec<Box<dyn Method>>, _>>()?;
         let mut all = Vec::new();
-        for spelling in ["toksvig", "vmf:6", "slopes", "slopes:9", "slopes:32"] {
-            let method = ndf::parse(spelling)?;
-            let maps = |method| Maps::new(self.device, &scene.materials, method, Precision::Half, &|_| ());
-            all.push((spelling, maps(&*Box::leak(method))?));
+        for (spelling, method) in spellings.into_iter().zip(&parsed) {
+            all.push((
+                spelling,
+                Maps::new(self.device, &scene.materials, &**method, Precision::Half, &|_| ())?,
+            ));
         }
         let lights = std::mem::take(&mut scene.lights);
         let mut columns = Vec::new();

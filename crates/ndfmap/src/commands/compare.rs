@@ -128,6 +128,9 @@ impl Compare {
         if let (Some(reel), Some(scene)) = (reel, self.scene) {
             value["scene"] = scene.into();
             value["truth"] = reel.truth_json().unwrap_or_default();
+            if let Some(read) = &environment {
+                value["environment"] = self.environment.to_json(read);
+            }
             for (method, measured) in reel.to_json() {
                 value["methods"][method]["picture"] = measured;
             }

@@ -22,3 +22,15 @@ pub(crate) fn json<S: AsRef<std::ffi::OsStr>>(words: &[S]) -> serde_json::Value 
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
 }
+
+/// Runs it: status, stdout and stderr.
+pub(crate) fn outcome(words: &[&str]) -> (i32, String, String) {
+    let output = ndfmap(words);
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code().unwrap(), text(&output.stdout), text(&output.stderr))
+}
+
+/// A path as a word of a command line.
+pub(crate) fn text(path: &Path) -> String {
+    path.display().to_string()
+}

@@ -144,29 +144,29 @@ impl Tables {
         let weight = |h: usize, d: usize| at(h, d).weight * scale[h];
         let (mut f, mut g) = (vec![0.0; BINS], vec![DVec3::ONE; BINS]);
         for _ in 0..ROUNDS {
-            for h in 0..BINS {
+            for (h, f) in f.iter_mut().enumerate() {
                 let (mut sum, mut square) = (0.0, 0.0);
-                for d in 0..BINS {
+                for (d, &g) in g.iter().enumerate() {
                     let w = weight(h, d);
-                    sum += w * (at(h, d).mean - diffuse).dot(g[d]);
-                    square += w * g[d].length_squared();
+                    sum += w * (at(h, d).mean - diffuse).dot(g);
+                    square += w * g.length_squared();
                 }
-                f[h] = if square > 0.0 { (sum / square).max(0.0) } else { 0.0 };
+                *f = if square > 0.0 { (sum / square).max(0.0) } else { 0.0 };
             }
-            for d in 0..BINS {
+            for (d, g) in g.iter_mut().enumerate() {
                 let (mut sum, mut square) = (DVec3::ZERO, 0.0);
-                for h in 0..BINS {
+                for (h, &f) in f.iter().enumerate() {
                     let w = weight(h, d);
-                    sum += (at(h, d).mean - diffuse) * (w * f[h]);
-                    square += w * f[h] * f[h];
+                    sum += (at(h, d).mean - diffuse) * (w * f);
+                    square += w * f * f;
                 }
-                g[d] = if square > 0.0 { (sum / square).max(DVec3::ZERO) } else { DVec3::ZERO };
+                *g = if square > 0.0 { (sum / square).max(DVec3::ZERO) } else { DVec3::ZERO };
             }
             // g is one on the whole, so that f is the lobe.
             let (mut sum, mut all) = (0.0, 0.0);
-            for i in 0..BINS * BINS {
-                sum += cells[i].weight * g[i % BINS].element_sum() / 3.0;
-                all += cells[i].weight;
+            for (cell, g) in cells.iter().zip(g.iter().cycle()) {
+                sum += cell.weight * g.element_sum() / 3.0;
+                all += cell.weight;
             }
             if sum > 0.0 {
                 let mean = sum / all;
@@ -174,10 +174,10 @@ impl Tables {
                 f.iter_mut().for_each(|f| *f *= mean);
             }
             let (mut sum, mut all) = (DVec3::ZERO, 0.0);
-            for h in 0..BINS {
-                for d in 0..BINS {
+            for (h, &f) in f.iter().enumerate() {
+                for (d, &g) in g.iter().enumerate() {
                     let w = weight(h, d);
-                    sum += (at(h, d).mean - f[h] * g[d]) * w;
+                    sum += (at(h, d).mean - f * g) * w;
                     all += w;
                 }
             }

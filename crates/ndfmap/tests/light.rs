@@ -1,0 +1,167 @@
+//! The command line under environments and with measured lobes.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
+
+mod common;
+
+use common::{json, outcome, text};
+use serde_json::Value;
+
+#[test]
+fn environments_light_scenes_and_turn() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = |name: &str| text(&folder.path().join(name));
+    let words =
+        ["render", "--scene", "sphere", "--map-size", "32", "--size", "24", "--device", "cpu", "--json"];
+    let told = json(
+        &[&words[..], &["--environment", "builtin:sky", "--truth", "64", "-m", "vmf:2,slopes"]].concat(),
+    );
+    assert_eq!(told["environment"]["file"], "builtin:sky");
+    assert_eq!(told["environment"]["technique"], "prefiltered");
+    assert_eq!(told["environment"]["suns"], 1);
+    for method in ["vmf:2", "slopes"] {
+        let error = &told["methods"][method]["error"];
+        assert!((error["brightness"].as_f64().unwrap() - 1.0).abs() < 0.1, "{method}: {error}");
+    }
+    // A turned film: its first frame is the environment as it is, its last is turned half around; and so for the other technique.
+    let film = picture("film.exr");
+    for how in ["prefiltered", "harmonics"] {
+        let turning = [
+            "--environment",
+            "builtin:studio",
+            "--environment-light",
+            how,
+            "--turn",
+            "0,180",
+            "--frames",
+            "3",
+            "-m",
+            "vmf:2",
+            "-o",
+            &film,
+        ];
+        json(&[&words[..], &turning].concat());
+        let still = picture("still.exr");
+        let turned = [
+            "--environment",
+            "builtin:studio",
+            "--environment-light",
+            how,
+            "--turn",
+            "180",
+            "--time",
+            "1",
+            "-m",
+            "vmf:2",
+            "-o",
+            &still,
+        ];
+        json(&[&words[..], &turned].concat());
+        let read = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+        assert!(
+            read("film-0002.exr") == read("still.exr") && read("film-0000.exr") != read("film-0002.exr"),
+            "{how}"
+        );
+    }
+    let compared = json(&[
+        "compare",
+        "builtin:foil",
+        "--size",
+        "32",
+        "--methods",
+        "vmf:2",
+        "--scene",
+        "sphere",
+        "--environment",
+        "builtin:white",
+        "--picture",
+        "16",
+        "--truth",
+        "32",
+        "--json",
+    ]);
+    assert_eq!(compared["environment"]["file"], "builtin:white");
+    assert!(
+        compared["methods"]["vmf:2"]["picture"]["error"]["relative_l2"].as_f64().unwrap() < 0.2,
+        "{compared}"
+    );
+}
+
+#[test]
+fn measured_lobes_bring_their_colours() {
+    let words = [
+        "render",
+        "--scene",
+        "sphere",
+        "--map-size",
+        "32",
+        "--size",
+        "24",
+        "--device",
+        "cpu",
+        "--json",
+        "--truth",
+        "64",
+    ];
+    let (status, out, err) =
+        outcome(&[&words[..], &["--brdf", "sgd:gold-metallic-paint", "-m", "vmf:2,sh:7"]].concat());
+    assert_eq!(status, 0, "{err}");
+    assert!(err.contains("sgd:gold-metallic-paint: kd + f(theta_h) g(theta_d) leaves"), "{err}");
+    let told: Value = serde_json::from_str(&out).unwrap();
+    assert!(told["methods"]["vmf:2"]["error"]["relative_l2"].as_f64().unwrap() < 0.3, "{told}");
+    let compared = json(&[
+        "compare",
+        "builtin:foil",
+        "--size",
+        "32",
+        "--methods",
+        "vmf:2",
+        "--brdf",
+        "sgd:blue-fabric",
+        "--json",
+    ]);
+    assert_eq!(compared["brdf"], "sgd:blue-fabric");
+}
+
+#[test]
+fn light_and_lobes_used_wrongly_say_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = text(&folder.path().join("short.binary"));
+    std::fs::write(&table, [90_u8, 0, 0, 0, 90, 0, 0, 0, 180, 0, 0, 0]).unwrap();
+    let merl = format!("merl:{table}");
+    let square = text(&folder.path().join("square.exr"));
+    json(&[
+        "render",
+        "--scene",
+        "v-groove",
+        "--size",
+        "4",
+        "--map-size",
+        "4",
+        "--device",
+        "cpu",
+        "-o",
+        &square,
+        "--json",
+    ]);
+    let sphere =
+        ["render", "--scene", "sphere", "--size", "4", "--map-size", "4", "--device", "cpu", "--json"];
+    for (words, status, wanted) in [
+        (&["--brdf", "sgd:blue-fabrik"][..], 2, "blue-fabric"),
+        (&["--brdf", "sgd:"], 2, "there is no such material"),
+        (&["--brdf", "merl"], 2, "as in `merl:FILE`"),
+        (&["--brdf", "merl:nowhere.binary"], 1, "nowhere.binary"),
+        (&["--brdf", &merl], 1, "has 12 bytes; a MERL table has 34992012"),
+        (&["--brdf", "sgd:nickel", "--displace"], 2, "none of microfacets"),
+        (&["--environment", "nowhere.hdr"], 1, "nowhere.hdr"),
+        (&["--environment", "builtin:moon"], 1, "built in are white, sky, studio"),
+        (&["--environment", &square], 1, "twice as wide as high"),
+        (&["--environment", "builtin:sky", "--environment-light", "magic"], 2, "prefiltered, harmonics"),
+        (&["--environment", "builtin:sky", "--turn", "1,2,3"], 2, "one number of degrees, or two"),
+        (&["--turn", "90"], 2, "--environment"),
+    ] {
+        let (code, out, err) = outcome(&[&sphere[..], words].concat());
+        assert_eq!((code, out.as_str()), (status, ""), "{words:?}: {err}");
+        assert!(err.contains(wanted), "{words:?}: {err}");
+    }
+}
