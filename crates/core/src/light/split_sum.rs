@@ -4,6 +4,10 @@
 //! the second is that of our own shading under lights, for any lobe and model: the integral over all directions of the light of what
 //! `reflect` (`ndf/reflect.rs`) gives for one lobe of normals, factors at the normals that answer included. A table over the cosine between
 //! the lobe's mean and the eye, and over the spread of its normals.
+//!
+//! Where the light comes from is of interest too: of a wide lobe seen flatly half is below the horizon of the normals that answer, so the
+//! rest comes from above the mirror direction, and from a narrower range. The table has both, from the mean of the light's directions, so
+//! that a blurred cube is asked for what has the same mean: else a bright window behind a sphere shines through its rim.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -33,6 +37,10 @@ pub struct Reflected {
     pub lobe: f64,
     /// The mean of Fresnel's rise over the diffuse part.
     pub rise: f64,
+    /// Sine of the angle between the lobe's mean and the mean direction of the light, over that of the mirror direction.
+    pub tilt: f64,
+    /// Perceptual roughness of the blur that has light from as wide a range, over that of the lobe itself.
+    pub blur: f64,
 }
 
 impl Reflected {
@@ -43,7 +51,17 @@ impl Reflected {
             bias: mix(self.bias, other.bias),
             lobe: mix(self.lobe, other.lobe),
             rise: mix(self.rise, other.rise),
+            tilt: mix(self.tilt, other.tilt),
+            blur: mix(self.blur, other.blur),
         }
+    }
+
+    /// The direction to look a blurred cube up in, for a lobe of mean `mu`.
+    #[must_use]
+    pub fn towards(&self, mu: DVec3, wo: DVec3) -> DVec3 {
+        // The part of the mirror direction that lies in the lobe's plane.
+        let across = (mu * mu.dot(wo) - wo) * self.tilt;
+        across + mu * (1.0 - across.length_squared()).max(0.0).sqrt()
     }
 }
 
@@ -91,13 +109,13 @@ impl SplitSum {
         row(j).mix(row(j + 1), y - j as f64)
     }
 
-    /// The table as shaders take it, two texels an entry: scale and bias; lobe, rise, and two spare. One row more holds the zonal
+    /// The table as shaders take it, two texels an entry: scale and bias; lobe, rise, tilt and blur. One row more holds the zonal
     /// coefficients from the left, and in its first texel, second, the facets.
     #[must_use]
     pub fn texels(&self) -> Vec<[f32; 4]> {
         let of = |e: &Reflected| {
             let [r, g, b] = e.scale.to_array();
-            [[r, g, b, e.bias], [e.lobe, e.rise, 0.0, 0.0]].map(|texel| texel.map(|v| v as f32))
+            [[r, g, b, e.bias], [e.lobe, e.rise, e.tilt, e.blur]].map(|texel| texel.map(|v| v as f32))
         };
         let mut texels: Vec<[f32; 4]> = self.entries.iter().flat_map(of).collect();
         let zonal =
@@ -126,7 +144,7 @@ const SPOKES: usize = 32;
 
 fn reflected(reflection: &Reflection, cosine: f64, spread: SlopeVariance) -> Reflected {
     let wo = DVec3::new((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine);
-    let mut sum = Reflected { rise: rise(wo), ..Reflected::default() };
+    let mut sum = Reflected { rise: rise(wo), tilt: 1.0, blur: 1.0, ..Reflected::default() };
     if !reflection.is_specular() {
         return sum;
     }
@@ -134,6 +152,7 @@ fn reflected(reflection: &Reflection, cosine: f64, spread: SlopeVariance) -> Ref
     // Half-vectors as GGX facets have them: it has weight wherever a lobe of this width has some.
     let alpha_squared = 2.0 * base.widen(spread).get();
     let share = |ring: usize| (ring as f64 + 0.5) / RINGS as f64;
+    let (mut towards, mut all) = (DVec3::ZERO, 0.0);
     for ring in 0..RINGS {
         // A warp of the shares to both ends, so that peak and tail have rings of their own: 3t² - 2t³, with its slope.
         let t = share(ring);
@@ -161,7 +180,15 @@ fn reflected(reflection: &Reflection, cosine: f64, spread: SlopeVariance) -> Ref
             sum.lobe += lobe;
             sum.scale += tint * (answered * (reflection.model.fresnel(DVec3::ONE, u).x - dark));
             sum.bias += answered * dark;
+            towards += way.wi * answered;
+            all += answered;
         }
+    }
+    if all > 0.0 {
+        let kernel = reflection.lobe.kernel();
+        let mean = towards / all;
+        sum.tilt = if wo.x > 1e-6 { -mean.x / (mean.length() * wo.x) } else { 1.0 };
+        sum.blur = kernel.roughness_of(mean.length()) / Kernel::roughness(base.widen(spread)).max(1e-6);
     }
     sum
 }
@@ -230,7 +257,7 @@ mod tests {
             let got = SplitSum::new(&reflection).lookup(cosine, spread);
             let wo = DVec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine);
             let base = reflection.width(SlopeVariance::ZERO);
-            let (mut scale, mut bias, mut lobe_sum) = (0.0, 0.0, 0.0);
+            let (mut scale, mut bias, mut lobe_sum, mut towards) = (0.0, 0.0, 0.0, DVec3::ZERO);
             for (z, weight) in gauss_legendre(400) {
                 for k in 0..400 {
                     let (y, x) = (TAU * f64::from(k) / 400.0).sin_cos();
@@ -243,12 +270,38 @@ mod tests {
                     lobe_sum += lobe;
                     scale += answered * (reflection.model.fresnel(DVec3::ONE, way.u).x - dark);
                     bias += answered * dark;
+                    towards += answered * way.wi;
                 }
             }
             // Thirty-two rings of a smooth function, cut at the horizon of half-vectors.
             assert!((got.lobe / lobe_sum - 1.0).abs() < 0.005, "{lobe}: {} {lobe_sum}", got.lobe);
             assert!((got.scale.x / scale - 1.0).abs() < 0.01, "{lobe}: {} {scale}", got.scale.x);
             assert!((got.bias - bias).abs() < 0.01 * scale, "{lobe}: {} {bias}", got.bias);
+            // Where the light comes from: within half a degree, and as wide.
+            let mean = towards / (scale + bias);
+            let angle = got.towards(DVec3::Z, wo).angle_between(mean).to_degrees();
+            assert!(angle < 0.5, "{lobe}: {angle} degrees");
+            let width = Kernel::roughness(base.widen(spread));
+            let blur = reflection.lobe.kernel().roughness_of(mean.length()) / width;
+            assert!((got.blur / blur - 1.0).abs() < 0.01, "{lobe}: {} {blur}", got.blur);
         }
+    }
+
+    #[test]
+    fn a_narrow_lobe_sees_the_mirror_direction_and_a_wide_one_seen_flatly_what_is_above() {
+        let narrow = table("beckmann:0.02", Model::Han);
+        let wide = table("beckmann:0.6", Model::Han);
+        for cosine in [0.2, 0.6, 1.0] {
+            let straight = narrow.lookup(cosine, SlopeVariance::ZERO);
+            // Mirrored, half-vectors are twice as wide, and across the plane of incidence as wide as the cosine, so that the mean of both
+            // variances is (1 + cos²)/2 of what it is seen straight on: to the fourth root, roughness. A lobe of 0.02 has one per cent more.
+            let blur = ((1.0 + cosine * cosine) / 2.0_f64).powf(0.25);
+            assert!((straight.tilt - 1.0).abs() < 0.01, "{straight:?}");
+            assert!((straight.blur - blur).abs() < 0.01, "{straight:?} {blur}");
+        }
+        let flat = wide.lookup(0.1, SlopeVariance::ZERO);
+        let wo = DVec3::new(0.99_f64.sqrt(), 0.0, 0.1);
+        // The mirror direction is at 0.1; the light that a normal faces, by its cosine, has to be well above.
+        assert!(flat.towards(DVec3::Z, wo).z > 0.4 && flat.blur < 1.0, "{flat:?}");
     }
 }

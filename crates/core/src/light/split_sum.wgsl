@@ -12,6 +12,10 @@ struct Reflected {
     lobe: f32,
     // The mean of Fresnel's rise over the diffuse part.
     rise: f32,
+    // Sine of the angle between the lobe's mean and the mean direction of the light, over that of the mirror direction.
+    tilt: f32,
+    // Perceptual roughness of the blur that has light from as wide a range, over that of the lobe itself.
+    blur: f32,
 }
 
 // What normals of this spread reflect to an eye at this cosine to their mean.
@@ -26,7 +30,14 @@ fn split_sum(cosine: f32, spread: f32) -> Reflected {
         mix(split_sum_texel(2u * i, j + 1u), split_sum_texel(2u * i + 2u, j + 1u), part.x), part.y);
     let b = mix(mix(split_sum_texel(2u * i + 1u, j), split_sum_texel(2u * i + 3u, j), part.x),
         mix(split_sum_texel(2u * i + 1u, j + 1u), split_sum_texel(2u * i + 3u, j + 1u), part.x), part.y);
-    return Reflected(a.xyz, a.w, b.x, b.y);
+    return Reflected(a.xyz, a.w, b.x, b.y, b.z, b.w);
+}
+
+// The direction to look a blurred cube up in, for a lobe of mean `mu`.
+fn reflected_towards(reflected: Reflected, mu: vec3<f32>, wo: vec3<f32>) -> vec3<f32> {
+    // The part of the mirror direction that lies in the lobe's plane.
+    let across = (mu * dot(mu, wo) - wo) * reflected.tilt;
+    return across + mu * sqrt(max(1.0 - dot(across, across), 0.0));
 }
 
 // What is left for the diffuse part of a material of this specular colour.

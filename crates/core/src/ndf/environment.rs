@@ -78,9 +78,9 @@ fn of_lobe(
     let seen = match surround.technique {
         Technique::Prefiltered => {
             let cube = surround.light.prefiltered(surround.split_sum.kernel);
-            let mirror = mu * (2.0 * mu.dot(surround.wo)) - surround.wo;
-            let width = reflection.width(spread);
-            cube.lookup(surround.to_environment * mirror, Kernel::level(width, cube.levels()))
+            let towards = surround.to_environment * reflected.towards(mu, surround.wo);
+            let roughness = (reflected.blur * Kernel::roughness(reflection.width(spread))).min(1.0);
+            cube.lookup(towards, roughness * (cube.levels() - 1) as f64)
         }
         Technique::Harmonics => over_half_vectors(mu, spread, printed, surround) / reflected.lobe.max(1e-9),
     };

@@ -25,8 +25,8 @@ fn lobe_light(mu: vec3<f32>, variance: f32, finish: Finish, reflection: Reflecti
     if environment.technique == HARMONICS {
         seen = over_half_vectors(around.turn * around.wo, around.turn * mu, spread, printed) / max(reflected.lobe, 1e-9);
     } else {
-        let mirror = mu * (2.0 * cosine) - around.wo;
-        seen = environment_blurred(around.turn * mirror, blurred_level(lobe_width(reflection, spread)));
+        let towards = reflected_towards(reflected, mu, around.wo);
+        seen = environment_blurred(around.turn * towards, blurred_level(lobe_width(reflection, spread), reflected.blur));
     }
     return seen * (finish.specular * reflected.scale + reflected.bias)
         + reflected_diffuse_share(reflection.model, reflected.rise, finish.specular) * diffuse;

@@ -20,7 +20,7 @@ struct Environment {
     technique: u32,
 }
 
-// The level of a blurred cube that is as wide as a lobe: its perceptual roughness.
-fn blurred_level(width: f32) -> f32 {
-    return min(sqrt(sqrt(2.0 * width)), 1.0) * (environment.size.y - 1.0);
+// The level of a blurred cube so many times as rough as a lobe; levels are even in perceptual roughness.
+fn blurred_level(width: f32, times: f32) -> f32 {
+    return min(times * min(sqrt(sqrt(2.0 * width)), 1.0), 1.0) * (environment.size.y - 1.0);
 }

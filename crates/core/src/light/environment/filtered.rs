@@ -10,7 +10,7 @@ use crate::light::Light;
 /// How lobes of normals meet an environment's highlights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Technique {
-    /// Each lobe looks up a cube that microfacets as wide as it have blurred, in the mirror direction of its mean.
+    /// Each lobe looks up a cube that microfacets as wide as it have blurred, where what it reflects comes from.
     #[default]
     Prefiltered,
     /// Han et al.'s sum over spherical harmonics of the half-vector, to order 8.

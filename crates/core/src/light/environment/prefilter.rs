@@ -26,6 +26,9 @@ pub enum Kernel {
 const RINGS: usize = 16;
 const SPOKES: usize = 12;
 
+/// Rings of a length's integral, which costs little.
+const FINE_RINGS: usize = 256;
+
 impl Kernel {
     /// Squared tangent of the angle within which this share of the facets is, by projected area.
     #[must_use]
@@ -49,11 +52,41 @@ impl Kernel {
         }
     }
 
-    /// The level of a cube of so many levels that is as wide as a lobe.
+    /// Perceptual roughness of a lobe: the root of alpha, alpha² being twice the variance.
     #[must_use]
-    pub fn level(width: SlopeVariance, levels: usize) -> f64 {
-        // Perceptual roughness, the root of alpha, alpha² being twice the variance.
-        (2.0 * width.get()).powf(0.25).min(1.0) * (levels - 1) as f64
+    pub fn roughness(width: SlopeVariance) -> f64 {
+        (2.0 * width.get()).powf(0.25).min(1.0)
+    }
+
+    /// Perceptual roughness of the blur whose light comes from directions of this mean length.
+    #[must_use]
+    pub fn roughness_of(self, length: f64) -> f64 {
+        // The length falls as roughness rises: halved thirty times.
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..30 {
+            let middle = (low + high) / 2.0;
+            if self.length(middle) > length {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        (low + high) / 2.0
+    }
+
+    /// Length of the mean of the directions that a blur takes light from.
+    fn length(self, roughness: f64) -> f64 {
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for ring in 0..FINE_RINGS {
+            let share = (ring as f64 + 0.5) / FINE_RINGS as f64;
+            let tan_squared = self.quantile(roughness.powi(4), share);
+            let cos = (1.0 - tan_squared) / (1.0 + tan_squared);
+            if cos > 0.0 {
+                sum += cos * cos;
+                weight += cos;
+            }
+        }
+        sum / weight
     }
 
     /// Filters a cube.
