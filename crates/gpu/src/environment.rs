@@ -84,8 +84,11 @@ impl<'a> Environments<'a> {
         let filtered = &*surroundings.filtered;
         let turn = surroundings.to_environment();
         let mut irradiance = [Vec4::ZERO; 9];
-        for (to, from) in irradiance.iter_mut().zip(filtered.irradiance.coefficients()) {
+        for (to, from) in irradiance.iter_mut().zip(filtered.irradiance.light.coefficients()) {
             *to = from.as_vec3().extend(0.0);
+        }
+        for (to, least) in irradiance.iter_mut().zip(filtered.irradiance.least.to_array()) {
+            to.w = least as f32;
         }
         let uniform = EnvironmentUniform {
             turn: [turn.x_axis, turn.y_axis, turn.z_axis].map(|axis| axis.as_vec3().extend(0.0)),

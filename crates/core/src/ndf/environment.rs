@@ -70,7 +70,7 @@ fn of_lobe(
     let spread = lobe.variance.widen(finish.gloss);
     let reflected = surround.split_sum.lookup(mu.dot(surround.wo), spread);
     let irradiance =
-        surround.light.irradiance.irradiance(surround.to_environment * mu, lobe.variance.get(), printed);
+        surround.light.irradiance.of_normals(surround.to_environment * mu, lobe.variance.get(), printed);
     let diffuse = finish.diffuse * irradiance / PI;
     if !reflection.is_specular() {
         return diffuse;
@@ -112,7 +112,7 @@ fn of_slopes(
     let mean = (-g.mean).extend(1.0).normalize();
     // Diffuse facets: what the map itself knows of slopes.
     let (mut lit, mut seen) = (DVec3::ZERO, 0.0);
-    let irradiance = |n: DVec3| surround.light.irradiance.irradiance(surround.to_environment * n, 0.0, false);
+    let irradiance = |n: DVec3| surround.light.irradiance.of_normals(surround.to_environment * n, 0.0, false);
     g.samples(grid, |sample| {
         let weight = if displaced { sample.weight * sample.leaning.dot(wo).max(0.0) } else { sample.weight };
         if weight > 0.0 {

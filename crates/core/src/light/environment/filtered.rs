@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use glam::DMat3;
 
-use super::{Cube, Environment, HalfVectors, Harmonics, IRRADIANCE_ORDER, Kernel, Suns, without_suns};
+use super::{Cube, Environment, HalfVectors, Irradiance, Kernel, Suns, without_suns};
 use crate::light::Light;
 
 /// How lobes of normals meet an environment's highlights.
@@ -42,8 +42,8 @@ impl Technique {
 pub struct FilteredEnvironment {
     /// Small bright sources, which shine as lights of their own. All else is without them.
     pub suns: Suns,
-    /// Orders that an irradiance has.
-    pub irradiance: Harmonics,
+    /// What diffuse facets receive.
+    pub irradiance: Irradiance,
     /// The light itself, at several widths.
     pub radiance: Cube,
     rest: Environment,
@@ -59,7 +59,7 @@ impl FilteredEnvironment {
         let (rest, suns) = without_suns(environment);
         Self {
             suns,
-            irradiance: Harmonics::of(&rest, IRRADIANCE_ORDER),
+            irradiance: Irradiance::of(&rest),
             radiance: Cube::of(&rest),
             rest,
             beckmann: OnceLock::new(),

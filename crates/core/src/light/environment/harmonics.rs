@@ -70,18 +70,51 @@ impl Harmonics {
         };
         (0..=self.order).map(order).sum()
     }
+}
+
+/// Texels that the least irradiance is looked for in, around.
+const FEW_TEXELS: usize = 64;
+
+/// What normals receive of an environment.
+#[derive(Clone, Debug)]
+pub struct Irradiance {
+    /// Its light, to order 2.
+    pub light: Harmonics,
+    /// The least that a normal receives of it, whatever it faces. Order 2 is off by up to 3/32 of a small lamp, below zero too: nothing is
+    /// darker than this.
+    pub least: DVec3,
+}
+
+impl Irradiance {
+    /// Of an environment.
+    #[must_use]
+    pub fn of(environment: &Environment) -> Self {
+        let few = environment.reduced(FEW_TEXELS);
+        let size = few.size();
+        let texels = (0..size.area()).map(|i| (i % size.width, i / size.width));
+        let light: Vec<(DVec3, DVec3)> = texels
+            .map(|(x, y)| {
+                let radiance = few.picture().row(y)[x].as_dvec3();
+                (few.direction(x as f64 + 0.5, y as f64 + 0.5), radiance * few.solid_angle(y))
+            })
+            .collect();
+        let received =
+            |n: &DVec3| light.iter().map(|(wi, power)| *power * n.dot(*wi).max(0.0)).sum::<DVec3>();
+        let least = light.iter().map(|(n, _)| received(n)).fold(DVec3::INFINITY, DVec3::min);
+        Self { light: Harmonics::of(environment, IRRADIANCE_ORDER), least }
+    }
 
     /// Irradiance of normals that stray around a direction, by Han et al.'s equation 25: `Lambda_l` as [`zonal_of_normals`] has it, or as
-    /// `printed`, `exp(-l² variance/2)`. What rings below zero is held there.
+    /// `printed`, `exp(-l² variance/2)`.
     #[must_use]
-    pub fn irradiance(&self, normal: DVec3, variance: f64, printed: bool) -> DVec3 {
+    pub fn of_normals(&self, normal: DVec3, variance: f64, printed: bool) -> DVec3 {
         let lambda = if printed {
             [1.0, (-0.5 * variance).exp(), (-2.0 * variance).exp()]
         } else {
             zonal_of_normals(variance)
         };
         let zonal = [0, 1, 2].map(|l| COSINE[l] * lambda[l]);
-        self.evaluate(normal, &zonal).max(DVec3::ZERO)
+        self.light.evaluate(normal, &zonal).max(self.least)
     }
 }
 
@@ -128,7 +161,7 @@ mod tests {
     fn irradiance_of_a_constant_is_pi_and_of_one_direction_is_a_cosine() {
         let size = Size { width: 128, height: 64 };
         let constant = Environment::new(Grid::from_fn(size, |_, _| Vec3::splat(0.5))).unwrap();
-        let e = Harmonics::of(&constant, 2).irradiance(DVec3::new(0.6, 0.0, 0.8), 0.1, false);
+        let e = Irradiance::of(&constant).of_normals(DVec3::new(0.6, 0.0, 0.8), 0.1, false);
         // Solid angles are exact, order 0 is too; orders 1 and 2 vanish by symmetry but for the middles of texels.
         assert!((e - DVec3::splat(0.5 * PI)).length() < 1e-3, "{e}");
         let mut one = Grid::from_fn(size, |_, _| Vec3::ZERO);
@@ -136,16 +169,36 @@ mod tests {
         one.row_mut(y)[x] = Vec3::splat((1.0 / constant.solid_angle(y)) as f32);
         let one = Environment::new(one).unwrap();
         let towards = one.direction(x as f64 + 0.5, y as f64 + 0.5);
-        let harmonics = Harmonics::of(&one, 2);
+        let irradiance = Irradiance::of(&one);
         for angle in [0.0, 0.5, 1.0_f64] {
             let (side, _) = crate::sphere::frame(towards);
             let n = towards * angle.cos() + side * angle.sin();
             // Known of order 2: 1/4 + u/2 + 5/32 (3u² - 1), which is off max(u, 0) by at most 3/32 (at u = 0 and 1).
             let u = angle.cos();
             let expected = 0.25 + 0.5 * u + 5.0 / 32.0 * (3.0 * u * u - 1.0);
-            assert!((harmonics.irradiance(n, 0.0, false).x - expected).abs() < 1e-6);
+            assert!((irradiance.of_normals(n, 0.0, false).x - expected).abs() < 1e-6);
             assert!((expected - u).abs() <= 3.0 / 32.0 + 1e-12);
         }
+    }
+
+    #[test]
+    fn nothing_is_darker_than_what_a_normal_receives() {
+        // A lamp of irradiance 1 in a dim room, 0.01 from everywhere: its back is lit by the room, pi/100, where order 2 rings to -0.06
+        // (u² = 0.16: 1/4 - 1/5 - 5/32 0.52, and 0.03 of the room).
+        let size = Size { width: 128, height: 64 };
+        let mut room = Grid::from_fn(size, |_, _| Vec3::splat(0.01));
+        let lamp = 1.0 / Environment::new(room.clone()).unwrap().solid_angle(20);
+        room.row_mut(20)[30] += Vec3::splat(lamp as f32);
+        let room = Environment::new(room).unwrap();
+        let lamp = room.direction(30.5, 20.5);
+        let irradiance = Irradiance::of(&room);
+        // Of sums over texels three degrees wide.
+        assert!((irradiance.least.x / (0.01 * PI) - 1.0).abs() < 0.01, "{}", irradiance.least);
+        let (side, _) = crate::sphere::frame(lamp);
+        let back = lamp * -0.4 + side * 0.84_f64.sqrt();
+        let zonal = [PI, 2.0 * PI / 3.0, PI / 4.0];
+        assert!(irradiance.light.evaluate(back, &zonal).x < 0.01);
+        assert!(irradiance.of_normals(back, 0.0, false) == irradiance.least);
     }
 
     #[test]

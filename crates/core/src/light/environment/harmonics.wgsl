@@ -15,8 +15,8 @@ fn zonal_of_normals(variance: f32) -> vec2<f32> {
     return vec2<f32>(first, 1.0 - 3.0 * v * first);
 }
 
-// Irradiance of normals of this variance around a direction, in the environment's frame (Han et al. 2007, equation 25). What rings below
-// zero is held there. The constants are those of the harmonics: sqrt(1/4 pi), sqrt(3/4 pi), sqrt(15/4 pi), sqrt(5/16 pi).
+// Irradiance of normals of this variance around a direction, in the environment's frame (Han et al. 2007, equation 25). Nothing is
+// darker than the least that a normal receives. The constants are those of the harmonics: sqrt(1/4 pi), sqrt(3/4 pi), sqrt(15/4 pi), sqrt(5/16 pi).
 fn environment_irradiance(n: vec3<f32>, variance: f32, printed: bool) -> vec3<f32> {
     var lambda = zonal_of_normals(variance);
     if printed {
@@ -27,5 +27,5 @@ fn environment_irradiance(n: vec3<f32>, variance: f32, printed: bool) -> vec3<f3
         + 0.31539157 * environment.irradiance[6].xyz * (3.0 * n.z * n.z - 1.0)
         + 0.54627422 * environment.irradiance[8].xyz * (n.x * n.x - n.y * n.y);
     let sum = PI * 0.28209479 * environment.irradiance[0].xyz + (2.0 * PI / 3.0) * lambda.x * c + (PI / 4.0) * lambda.y * d;
-    return max(sum, vec3<f32>(0.0));
+    return max(sum, vec3<f32>(environment.irradiance[0].w, environment.irradiance[1].w, environment.irradiance[2].w));
 }

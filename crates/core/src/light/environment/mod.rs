@@ -19,7 +19,7 @@ mod sun;
 pub use cube::{Cube, cube_direction};
 pub use filtered::{FilteredEnvironment, Surroundings, Technique};
 pub use half_vectors::{HALF_VECTOR_ORDER, HalfVectors, VIEWS};
-pub use harmonics::{Harmonics, IRRADIANCE_ORDER, zonal_of_normals};
+pub use harmonics::{Harmonics, IRRADIANCE_ORDER, Irradiance, zonal_of_normals};
 pub use prefilter::Kernel;
 pub use sampling::EnvironmentSampler;
 pub use sun::{Suns, without_suns};
@@ -118,21 +118,23 @@ impl Environment {
         (0..self.size().height).map(row).sum::<DVec3>() / (4.0 * PI)
     }
 
-    /// The same light in fewer texels, each the mean of those it holds by solid angle: the longest side that halving leaves above `width`.
+    /// The same light in fewer texels, each the mean of those it holds by solid angle: the longest side that halving leaves at `width` or above.
+    /// Of odd sides the last row or column stays alone, though it is as wide as the others then: directions stray by a texel of the larger.
     #[must_use]
     pub fn reduced(&self, width: usize) -> Self {
         let mut all = self.clone();
-        while all.size().width / 2 >= width
-            && all.size().width.is_multiple_of(2)
-            && all.size().height.is_multiple_of(2)
-        {
-            let half = Size { width: all.size().width / 2, height: all.size().height / 2 };
+        while all.size().width / 2 >= width {
+            let Size { width, height } = all.size();
+            let half = Size { width: width.div_ceil(2), height: height.div_ceil(2) };
             let mean = |x: usize, y: usize| {
-                let [a, b] = [2 * y, 2 * y + 1].map(|row| {
-                    let two = &all.radiance.row(row)[2 * x..2 * x + 2];
-                    ((two[0] + two[1]).as_dvec3() * all.solid_angle(row), 2.0 * all.solid_angle(row))
-                });
-                ((a.0 + b.0) / (a.1 + b.1)).as_vec3()
+                let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
+                for row in 2 * y..(2 * y + 2).min(height) {
+                    for texel in &all.radiance.row(row)[2 * x..(2 * x + 2).min(width)] {
+                        sum += texel.as_dvec3() * all.solid_angle(row);
+                        weight += all.solid_angle(row);
+                    }
+                }
+                (sum / weight).as_vec3()
             };
             all = Self { radiance: Grid::from_fn(half, mean) };
         }
@@ -189,6 +191,12 @@ pub(crate) mod tests {
         // Single floats.
         assert!((few.mean() - e.mean()).length() < 1e-6);
         assert_eq!(e.reduced(65).size(), e.size());
+        // Odd sides too are reduced, else what is done with few texels might never end. Directions stray by pi/255 at most, halfway to the
+        // last row, of light that changes by less than its mean a radian.
+        let odd = smooth(Size { width: 511, height: 255 });
+        let few = odd.reduced(64);
+        assert_eq!(few.size(), Size { width: 64, height: 32 });
+        assert!((few.mean() - odd.mean()).length() < PI / 255.0 / 2.0 * odd.mean().length());
     }
 
     #[test]
