@@ -13,6 +13,7 @@ use ndfmap::core::pyramid::Precision;
 use ndfmap::core::sphere::DiskLattice;
 use ndfmap::core::surface::{SlopeFilter, Wraps};
 use ndfmap::maps::source::{Convention, DEFAULT_HEIGHT_SCALE, SourceOptions, read_source};
+use rayon::prelude::*;
 
 /// From matte to shiny.
 const MATERIALS: [&str; 10] = [
@@ -76,18 +77,20 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             100.0 * factors.residual.fitted
         );
         let truth = Truth::new(&*source.surface, &*lobe, &lattice);
+        let size = pyramids[0].sizes()[LEVEL];
+        let of = |i: usize| (i % size.width, i / size.width);
+        let places: Vec<(usize, usize)> =
+            (0..size.area()).map(of).filter(|(x, y)| x % STEP == 0 && y % STEP == 0).collect();
+        let truths: Vec<Vec<f64>> = places.par_iter().map(|(x, y)| truth.texel(size, *x, *y)).collect();
         for (method, pyramid) in methods.iter().zip(&pyramids) {
-            let size = pyramid.sizes()[LEVEL];
             let evaluator = method.evaluator(&*lobe, &lattice.directions);
             let (mut off, mut all) = (0.0, 0.0);
             let mut lobe_of = vec![0.0; lattice.len()];
-            for y in (0..size.height).step_by(STEP) {
-                for x in (0..size.width).step_by(STEP) {
-                    evaluator.evaluate(&pyramid.texel(LEVEL, x, y), &mut lobe_of);
-                    for (a, b) in lobe_of.iter().zip(truth.texel(size, x, y)) {
-                        off += (a - b) * (a - b);
-                        all += b * b;
-                    }
+            for ((x, y), truth) in places.iter().zip(&truths) {
+                evaluator.evaluate(&pyramid.texel(LEVEL, *x, *y), &mut lobe_of);
+                for (a, b) in lobe_of.iter().zip(truth) {
+                    off += (a - b) * (a - b);
+                    all += b * b;
                 }
             }
             print!("{:8.3}", (off / all).sqrt());
