@@ -217,6 +217,14 @@ fn tables_in_the_documents_are_those_of_the_code() {
     for row in ndfmap_core::procedural::TABLE {
         assert!(methods.contains(&format!("`builtin:{}`", row.name)), "docs/methods.md lacks {}", row.name);
     }
+    let environments = read(Path::new("docs/environment.md"));
+    for row in ndfmap_core::light::environment::builtin::TABLE {
+        assert!(
+            environments.contains(&format!("`builtin:{}`", row.name)),
+            "docs/environment.md lacks {}",
+            row.name
+        );
+    }
     let scenes = read(Path::new("docs/scenes.md"));
     for row in ndfmap_core::scene::TABLE {
         assert!(scenes.contains(&format!("`{}`", row.name)), "docs/scenes.md lacks {}", row.name);

@@ -7,6 +7,8 @@ mod common;
 use common::{json, outcome, text};
 use serde_json::Value;
 
+const COMPARED: [&str; 7] = ["compare", "builtin:foil", "--size", "32", "--methods", "vmf:2", "--json"];
+
 #[test]
 fn environments_light_scenes_and_turn() {
     let folder = tempfile::tempdir().unwrap();
@@ -21,7 +23,8 @@ fn environments_light_scenes_and_turn() {
     assert_eq!(told["environment"]["suns"], 1);
     for method in ["vmf:2", "slopes"] {
         let error = &told["methods"][method]["error"];
-        assert!((error["brightness"].as_f64().unwrap() - 1.0).abs() < 0.1, "{method}: {error}");
+        // The truth's noise is 0.04 a pixel, and less of the whole.
+        assert!((error["brightness"].as_f64().unwrap() - 1.0).abs() < 0.04, "{method}: {error}");
     }
     // A turned film: its first frame is the environment as it is, its last is turned half around; and so for the other technique.
     let film = picture("film.exr");
@@ -63,28 +66,13 @@ fn environments_light_scenes_and_turn() {
             "{how}"
         );
     }
-    let compared = json(&[
-        "compare",
-        "builtin:foil",
-        "--size",
-        "32",
-        "--methods",
-        "vmf:2",
-        "--scene",
-        "sphere",
-        "--environment",
-        "builtin:white",
-        "--picture",
-        "16",
-        "--truth",
-        "32",
-        "--json",
-    ]);
+    let pictures =
+        ["--scene", "sphere", "--environment", "builtin:white", "--picture", "16", "--truth", "32"];
+    let compared = json(&[&COMPARED[..], &pictures].concat());
     assert_eq!(compared["environment"]["file"], "builtin:white");
-    assert!(
-        compared["methods"]["vmf:2"]["picture"]["error"]["relative_l2"].as_f64().unwrap() < 0.2,
-        "{compared}"
-    );
+    // Thirty-two rays have a noise of 0.044.
+    let error = &compared["methods"]["vmf:2"]["picture"]["error"];
+    assert!(error["relative_l2"].as_f64().unwrap() < 2.0 * 0.044, "{compared}");
 }
 
 #[test]
@@ -108,18 +96,10 @@ fn measured_lobes_bring_their_colours() {
     assert_eq!(status, 0, "{err}");
     assert!(err.contains("sgd:gold-metallic-paint: kd + f(theta_h) g(theta_d) leaves"), "{err}");
     let told: Value = serde_json::from_str(&out).unwrap();
-    assert!(told["methods"]["vmf:2"]["error"]["relative_l2"].as_f64().unwrap() < 0.3, "{told}");
-    let compared = json(&[
-        "compare",
-        "builtin:foil",
-        "--size",
-        "32",
-        "--methods",
-        "vmf:2",
-        "--brdf",
-        "sgd:blue-fabric",
-        "--json",
-    ]);
+    // Two lobes are near, as docs/environment.md has it for six; order 7 is not.
+    let error = |method: &str| told["methods"][method]["error"]["relative_l2"].as_f64().unwrap();
+    assert!(error("vmf:2") < 0.1 && error("vmf:2") < error("sh:7"), "{told}");
+    let compared = json(&[&COMPARED[..], &["--brdf", "sgd:blue-fabric"]].concat());
     assert_eq!(compared["brdf"], "sgd:blue-fabric");
 }
 

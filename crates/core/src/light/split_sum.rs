@@ -277,7 +277,7 @@ mod tests {
             assert!((got.lobe / lobe_sum - 1.0).abs() < 0.005, "{lobe}: {} {lobe_sum}", got.lobe);
             assert!((got.scale.x / scale - 1.0).abs() < 0.01, "{lobe}: {} {scale}", got.scale.x);
             assert!((got.bias - bias).abs() < 0.01 * scale, "{lobe}: {} {bias}", got.bias);
-            // Where the light comes from: within half a degree, and as wide.
+            // Where the light comes from, of the same rings: a cosine that is 1 % off at 60 degrees is half a degree, and roughness is a root.
             let mean = towards / (scale + bias);
             let angle = got.towards(DVec3::Z, wo).angle_between(mean).to_degrees();
             assert!(angle < 0.5, "{lobe}: {angle} degrees");
@@ -301,7 +301,7 @@ mod tests {
         }
         let flat = wide.lookup(0.1, SlopeVariance::ZERO);
         let wo = DVec3::new(0.99_f64.sqrt(), 0.0, 0.1);
-        // The mirror direction is at 0.1; the light that a normal faces, by its cosine, has to be well above.
+        // The mirror direction is at 0.1; all that a normal faces, by its cosine, has its mean at 2/3. So wide a lobe is nearer to that.
         assert!(flat.towards(DVec3::Z, wo).z > 0.4 && flat.blur < 1.0, "{flat:?}");
     }
 }

@@ -79,8 +79,7 @@ fn of_lobe(
         Technique::Prefiltered => {
             let cube = surround.light.prefiltered(surround.split_sum.kernel);
             let towards = surround.to_environment * reflected.towards(mu, surround.wo);
-            let roughness = (reflected.blur * Kernel::roughness(reflection.width(spread))).min(1.0);
-            cube.lookup(towards, roughness * (cube.levels() - 1) as f64)
+            cube.lookup(towards, Kernel::level(reflection.width(spread), reflected.blur, cube.levels()))
         }
         Technique::Harmonics => over_half_vectors(mu, spread, printed, surround) / reflected.lobe.max(1e-9),
     };

@@ -35,15 +35,7 @@ impl HalfVectors {
     /// as large, so texels count by their own.
     #[must_use]
     pub fn of(environment: &Environment) -> Self {
-        let few = environment.reduced(TEXELS);
-        let (width, height) = (few.size().width, few.size().height);
-        let mut light = Vec::with_capacity(width * height);
-        for y in 0..height {
-            for x in 0..width {
-                let towards = few.direction(x as f64 + 0.5, y as f64 + 0.5);
-                light.push((towards, few.picture().row(y)[x].as_dvec3() * few.solid_angle(y)));
-            }
-        }
+        let light = environment.beams(TEXELS);
         let view = |i: usize| {
             let wo = view_direction(i % VIEWS, i / VIEWS);
             let (mut sums, mut basis) = (vec![DVec3::ZERO; COUNT], [0.0; COUNT]);

@@ -118,10 +118,21 @@ impl Environment {
         (0..self.size().height).map(row).sum::<DVec3>() / (4.0 * PI)
     }
 
+    /// Light as directions, and radiance times the solid angle that it comes from: of every texel, [`Self::reduced`] to about `width` of them around.
+    pub(super) fn beams(&self, width: usize) -> Vec<(DVec3, DVec3)> {
+        let few = self.reduced(width);
+        let Size { width, height } = few.size();
+        let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        let beam = |(x, y): (usize, usize)| {
+            let power = few.radiance.row(y)[x].as_dvec3() * few.solid_angle(y);
+            (few.direction(x as f64 + 0.5, y as f64 + 0.5), power)
+        };
+        texels.map(beam).collect()
+    }
+
     /// The same light in fewer texels, each the mean of those it holds by solid angle: the longest side that halving leaves at `width` or above.
     /// Of odd sides the last row or column stays alone, though it is as wide as the others then: directions stray by a texel of the larger.
-    #[must_use]
-    pub fn reduced(&self, width: usize) -> Self {
+    fn reduced(&self, width: usize) -> Self {
         let mut all = self.clone();
         while all.size().width / 2 >= width {
             let Size { width, height } = all.size();

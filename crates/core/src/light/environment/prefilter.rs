@@ -58,6 +58,12 @@ impl Kernel {
         (2.0 * width.get()).powf(0.25).min(1.0)
     }
 
+    /// The level of a cube of so many levels that is so many times as rough as a lobe.
+    #[must_use]
+    pub fn level(width: SlopeVariance, times: f64, levels: usize) -> f64 {
+        (times * Self::roughness(width)).min(1.0) * (levels - 1) as f64
+    }
+
     /// Perceptual roughness of the blur whose light comes from directions of this mean length.
     #[must_use]
     pub fn roughness_of(self, length: f64) -> f64 {
