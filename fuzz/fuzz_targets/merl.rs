@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
-use ndfmap_core::brdf::Brdf;
+use ndfmap_core::brdf::Lobe;
 use ndfmap_maps::merl::parse_merl;
 
 const SIZE: usize = 12 + 3 * 8 * 90 * 90 * 180;

@@ -4,13 +4,13 @@
 use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
-use ndfmap_core::scene::Staging;
+use ndfmap_core::scene::SceneOptions;
 use ndfmap_maps::model::{ModelOptions, model_of_bytes};
 
 fuzz_target!(|bytes: &[u8]| {
     let Some((first, bytes)) = bytes.split_first() else { return };
     let name = ["map.obj", "map.ply", "map.gltf", "map.glb"][usize::from(first & 3)];
-    let options = ModelOptions { staging: Staging::default() };
+    let options = ModelOptions { staging: SceneOptions::default() };
     if let Ok((scene, _)) = model_of_bytes(Path::new(name), bytes, &options) {
         for object in &scene.objects {
             assert!(object.mesh.vertices.iter().all(|v| v.position.is_finite() && v.normal.is_finite()));

@@ -28,17 +28,15 @@
 
 pub mod bake;
 pub mod brdf;
-pub mod error;
-pub mod filtering;
 pub mod fit;
 pub mod grid;
 pub mod light;
 pub mod lookup;
+pub mod measure;
 pub mod metrics;
 pub mod ndf;
 pub mod procedural;
 pub mod pyramid;
-pub mod reflection;
 pub mod scene;
 pub mod shader;
 pub mod sphere;

@@ -6,8 +6,7 @@
 
 use std::fmt::Display;
 
-use crate::brdf::Brdf;
-use crate::light::environment::Kernel;
+use crate::brdf::{Lobe, Microfacets};
 use crate::ndf::Method;
 
 /// A method's own part of a shader.
@@ -21,8 +20,8 @@ pub struct Shader {
     pub sources: &'static [&'static str],
     /// True when its text has `reflect_displaced` for itself: it knows of displacement.
     pub displaces: bool,
-    /// What lights its texels by an environment: `reflect_surround`.
-    pub surround: &'static str,
+    /// What lights its texels by an environment: `reflect_environment`.
+    pub environment: &'static str,
 }
 
 /// What makes a method's texels sums of isotropic lobes.
@@ -35,18 +34,18 @@ impl Shader {
     /// One without constants or a table.
     #[must_use]
     pub(crate) fn new(sources: &'static [&'static str]) -> Self {
-        let surround = if sources.contains(&MIXTURE) {
+        let environment = if sources.contains(&MIXTURE) {
             include_str!("ndf/mixture_environment.wgsl")
         } else {
             include_str!("ndf/whole_environment.wgsl")
         };
-        Self { constants: String::new(), table: 1, sources, displaces: false, surround }
+        Self { constants: String::new(), table: 1, sources, displaces: false, environment }
     }
 
     /// One whose text has `reflect_displaced`.
     #[must_use]
     pub(crate) fn displaces(self) -> Self {
-        Self { displaces: true, surround: include_str!("ndf/leadr_environment.wgsl"), ..self }
+        Self { displaces: true, environment: include_str!("ndf/leadr_environment.wgsl"), ..self }
     }
 
     /// Adds a constant.
@@ -85,9 +84,9 @@ impl Constant for f32 {
     const SUFFIX: &str = "f";
 }
 
-/// What every shader has: [`crate::reflection`], [`crate::brdf`], [`crate::ndf`] in common.
+/// What every shader has: [`crate::brdf`], [`crate::brdf`], [`crate::ndf`] in common.
 const SHARED: [&str; 4] = [
-    include_str!("reflection.wgsl"),
+    include_str!("brdf/shading.wgsl"),
     include_str!("brdf/lambert.wgsl"),
     include_str!("brdf/masking.wgsl"),
     include_str!("ndf/reflect.wgsl"),
@@ -98,12 +97,12 @@ pub const LOOKUP: &str = include_str!("lookup.wgsl");
 
 /// The text that decodes and shades texels of a method with a lobe.
 ///
-/// `attributes` (0 to 2) is how many colours each lobe carries: albedo with gloss, and specular colour.
+/// `attributes` (0 to 2) is how many colours each lobe carries: albedo with roughness, and specular colour.
 ///
 /// # Panics
 /// When there are attributes and the method has no fitted lobes to carry them.
 #[must_use]
-pub fn link(method: &dyn Method, lobe: &dyn Brdf, attributes: usize) -> String {
+pub fn link(method: &dyn Method, lobe: &dyn Lobe, attributes: usize) -> String {
     assert!(attributes == 0 || method.fit().is_some(), "only fitted lobes carry attributes");
     let own = method.shader();
     let layers = method.layers() as u32;
@@ -135,14 +134,14 @@ const ENVIRONMENT: [&str; 6] = [
     include_str!("ndf/environment.wgsl"),
 ];
 
-/// The text that lights texels by an environment, to stand beside what [`link`] makes: `reflect_surround`. What the host brings besides is
+/// The text that lights texels by an environment, to stand beside what [`link`] makes: `reflect_environment`. What the host brings besides is
 /// said in `light/environment/environment.wgsl`.
 #[must_use]
-pub fn link_environment(method: &dyn Method, lobe: &dyn Brdf) -> String {
+pub fn link_environment(method: &dyn Method, lobe: &dyn Lobe) -> String {
     let own = method.shader();
-    let mut text = (lobe.kernel() == Kernel::Beckmann).declare("GAUSSIAN_FACETS");
+    let mut text = (lobe.microfacets() == Microfacets::Beckmann).declare("GAUSSIAN_FACETS");
     let sphere = (!own.sources.contains(&SPHERE)).then_some(SPHERE);
-    for source in ENVIRONMENT.iter().copied().chain(sphere).chain([own.surround]) {
+    for source in ENVIRONMENT.iter().copied().chain(sphere).chain([own.environment]) {
         text.push('\n');
         text += source;
     }
@@ -151,7 +150,7 @@ pub fn link_environment(method: &dyn Method, lobe: &dyn Brdf) -> String {
 
 /// The text of one normal's reflection by a lobe, without a method: what a truth is made of.
 #[must_use]
-pub fn link_lobe(lobe: &dyn Brdf) -> String {
-    let [reflection, lambert, masking, _] = SHARED;
-    [&1u32.declare("TABLE"), reflection, lambert, masking, &*lobe.shader()].join("\n")
+pub fn link_lobe(lobe: &dyn Lobe) -> String {
+    let [brdf, lambert, masking, _] = SHARED;
+    [&1u32.declare("TABLE"), brdf, lambert, masking, &*lobe.shader()].join("\n")
 }

@@ -4,8 +4,8 @@
 
 use glam::DVec3;
 use ndfmap_core::bake::Bake;
-use ndfmap_core::error::{DISK_RADIUS, Truth};
 use ndfmap_core::grid::Size;
+use ndfmap_core::measure::{DISK_RADIUS, TexelTruth};
 use ndfmap_core::procedural::{self, GROOVE_SLOPE};
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::sphere::DiskLattice;
@@ -38,7 +38,7 @@ fn a_v_groove_has_two_lobes() {
     let lobe = brdf::parse("blinn-phong:400").unwrap();
     let lattice = DiskLattice::new(201, DISK_RADIUS);
     let surface = groove();
-    let truth = Truth::new(&*surface, &*lobe, &lattice).texel(Size::new(1, 1).unwrap(), 0, 0);
+    let truth = TexelTruth::new(&*surface, &*lobe, &lattice).texel(Size::new(1, 1).unwrap(), 0, 0);
     // Along the middle row, y = 0, exactly two maxima, at the flanks' n.x = ± 0.447.
     let (_, middle) = lattice.rows.iter().find(|(y, _)| y.abs() < 1e-9).unwrap();
     let row: Vec<(f64, f64)> = middle.clone().map(|i| (lattice.directions[i].x, truth[i])).collect();
@@ -74,7 +74,7 @@ fn sh_2_shades_a_v_groove_with_lambert_in_closed_form() {
     let lambert = brdf::parse("lambert").unwrap();
     let lattice = DiskLattice::new(16, DISK_RADIUS);
     let surface = groove();
-    let truth = Truth::new(&*surface, &*lambert, &lattice).texel(Size::new(1, 1).unwrap(), 0, 0);
+    let truth = TexelTruth::new(&*surface, &*lambert, &lattice).texel(Size::new(1, 1).unwrap(), 0, 0);
     let sh = coarsest(&*surface, "sh:2", "lambert", &lattice.directions);
     assert!(truth.iter().zip(sh).all(|(t, s)| (t - s).abs() < 0.04));
 }
@@ -88,7 +88,7 @@ fn gaussian_noise_is_what_slopes_are_exact_for() {
     let surface = procedural::gaussian_noise(size, x, y, 3);
     let lobe = brdf::parse("beckmann:0.2").unwrap();
     let lattice = DiskLattice::new(64, DISK_RADIUS);
-    let truth = Truth::new(&*surface, &*lobe, &lattice).texel(Size::new(1, 1).unwrap(), 0, 0);
+    let truth = TexelTruth::new(&*surface, &*lobe, &lattice).texel(Size::new(1, 1).unwrap(), 0, 0);
     let error = |method: &str| {
         let approx = coarsest(&*surface, method, "beckmann:0.2", &lattice.directions);
         let norm = |f: &dyn Fn(usize) -> f64| (0..truth.len()).map(|i| f(i).powi(2)).sum::<f64>().sqrt();

@@ -4,8 +4,8 @@
 
 use glam::{DVec3, Vec3};
 use ndfmap_core::bake::Bake;
-use ndfmap_core::error::Truth;
 use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::measure::TexelTruth;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::sphere::{DiskLattice, sh_count, spherical_harmonics};
 use ndfmap_core::surface::{NormalGrid, Wraps};
@@ -63,7 +63,7 @@ fn effective_lobes_of_explicit_normals() {
         let value = value.as_f64().unwrap();
         let got = if method == "truth" {
             let lattice = DiskLattice { directions: w.to_vec(), rows: vec![(w[0].y, 0..1)] };
-            Truth::new(&surface, &*lobe, &lattice).texel(Size { width: 1, height: 1 }, 0, 0)[0]
+            TexelTruth::new(&surface, &*lobe, &lattice).texel(Size { width: 1, height: 1 }, 0, 0)[0]
         } else {
             let method = ndf::parse(method).unwrap();
             let bake =

@@ -6,14 +6,15 @@
 use std::time::Instant;
 
 use ndfmap_core::grid::Size;
-use ndfmap_core::light::environment::{Surroundings, Technique, builtin};
+use ndfmap_core::light::environment::{SceneEnvironment, Technique, builtin};
 use ndfmap_core::lookup::Filtering;
 use ndfmap_core::metrics::{color_error, relative_l2};
 use ndfmap_core::ndf::{self, Method};
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{self, Scene, Staging};
+use ndfmap_core::scene::{self, Scene, SceneOptions};
 use ndfmap_gpu::{
-    Canvas, Device, Effort, FinestMaps, Geometry, Lookups, Maps, Meshes, Outlines, Renderer, Sampling, Shown,
+    Antialiasing, Canvas, Device, Effort, FinestMaps, Geometry, Lookups, Maps, Meshes, Renderer, Sampling,
+    SceneView,
 };
 
 const METHODS: &[&str] = &[
@@ -45,7 +46,7 @@ fn setting(name: &str, default: usize) -> usize {
 fn staged(name: &str, time: f64, size: Size) -> Outcome<Scene> {
     let row = scene::find(name).ok_or("no such scene")?;
     let side = size.width.next_power_of_two().min(512);
-    Ok((row.build)(&Staging { time, map_size: Size { width: side, height: side }, map: None }))
+    Ok((row.build)(&SceneOptions { time, map_size: Size { width: side, height: side }, map: None }))
 }
 
 fn median(mut times: Vec<f64>) -> f64 {
@@ -89,7 +90,7 @@ impl Bench<'_> {
     fn times(
         &self,
         canvas: &Canvas<'_>,
-        shown: &Shown<'_>,
+        shown: &SceneView<'_>,
         all: &[(&str, Maps<'_>)],
         sampling: Sampling,
     ) -> Outcome<Vec<f64>> {
@@ -109,9 +110,9 @@ impl Bench<'_> {
     fn methods(&self, name: &str, time: f64, size: Size) -> Outcome<()> {
         let scene = staged(name, time, size)?;
         let geometry = Geometry::new(self.device, &scene)?;
-        let shown = Shown { scene: &scene, geometry: &geometry, camera: &scene.camera };
-        let canvas = Canvas::new(self.device, size, Outlines::Sharp)?;
-        let parts = Canvas::new(self.device, size, Outlines::Parts)?;
+        let shown = SceneView { scene: &scene, geometry: &geometry, camera: &scene.camera };
+        let canvas = Canvas::new(self.device, size, Antialiasing::Sharp)?;
+        let parts = Canvas::new(self.device, size, Antialiasing::Parts)?;
         let finest = FinestMaps::new(self.device, &scene.materials)?;
         let effort = |samples| Effort { samples, noise: 0.0, progress: &|_| () };
         let truth = self.renderer.truth(&canvas, &shown, &finest, &effort(512))?;
@@ -161,7 +162,7 @@ impl Bench<'_> {
         let flat = staged(name, time, size)?;
         let mut scene = staged(name, time, size)?;
         scene.displace(1.0, false)?;
-        let canvas = Canvas::new(self.device, size, Outlines::Sharp)?;
+        let canvas = Canvas::new(self.device, size, Antialiasing::Sharp)?;
         let method = ndf::parse("slopes")?;
         let maps =
             |scene: &Scene| Maps::new(self.device, &scene.materials, &*method, Precision::Half, &|_| ());
@@ -176,9 +177,9 @@ impl Bench<'_> {
             self.device.wait()?;
             let cutting = begin.elapsed().as_secs_f64() * 1e3;
             triangles = geometry.len();
-            let shown = Shown { scene: &scene, geometry: &geometry, camera: &scene.camera };
+            let shown = SceneView { scene: &scene, geometry: &geometry, camera: &scene.camera };
             let drawing = self.renderer.time(&canvas, &shown, &maps, Lookups::TRILINEAR)?;
-            let shown = Shown { scene: &flat, geometry: &flat_geometry, camera: &flat.camera };
+            let shown = SceneView { scene: &flat, geometry: &flat_geometry, camera: &flat.camera };
             let flat_drawing = self.renderer.time(&canvas, &shown, &flat_maps, Lookups::TRILINEAR)?;
             if turn > 0 {
                 cut.push(cutting);
@@ -206,19 +207,19 @@ impl Bench<'_> {
     ) -> Outcome<()> {
         let mut scene = staged(name, time, size)?;
         let built = builtin::find("sky").ok_or("no such environment")?.build();
-        let surroundings = Surroundings::new(built);
+        let environment = SceneEnvironment::new(built);
         let geometry = Geometry::new(self.device, &scene)?;
-        let canvas = Canvas::new(self.device, size, Outlines::Sharp)?;
+        let canvas = Canvas::new(self.device, size, Antialiasing::Sharp)?;
         let parsed = parsed(spellings)?;
         let all = self.maps(&scene, &parsed)?;
         let times = |scene: &Scene| {
-            let shown = Shown { scene, geometry: &geometry, camera: &scene.camera };
+            let shown = SceneView { scene, geometry: &geometry, camera: &scene.camera };
             self.times(&canvas, &shown, &all, Sampling::Sampler(1))
         };
         let lit = times(&scene)?;
         scene.lights.clear();
         for technique in techniques {
-            scene.surroundings = Some(Surroundings { technique: *technique, ..surroundings.clone() });
+            scene.environment = Some(SceneEnvironment { technique: *technique, ..environment.clone() });
             for (((spelling, _), lit), ms) in all.iter().zip(&lit).zip(times(&scene)?) {
                 println!(
                     "{name} at {time}, {spelling}: {lit:.2} ms lit; in an environment, {}, {ms:.2} ms: {:.2} times",
@@ -233,10 +234,10 @@ impl Bench<'_> {
     fn creature(&self, size: Size) -> Outcome<()> {
         let scene = staged("creature", 0.3, size)?;
         let geometry = Geometry::new(self.device, &scene)?;
-        let shown = Shown { scene: &scene, geometry: &geometry, camera: &scene.camera };
+        let shown = SceneView { scene: &scene, geometry: &geometry, camera: &scene.camera };
         let method = ndf::parse("vmf:6")?;
         let all = [("vmf:6", Maps::new(self.device, &scene.materials, &*method, Precision::Half, &|_| ())?)];
-        for outlines in [Outlines::Sharp, Outlines::Multisampled] {
+        for outlines in [Antialiasing::Sharp, Antialiasing::Multisampled] {
             let canvas = Canvas::new(self.device, size, outlines)?;
             let ms = self.times(&canvas, &shown, &all, Sampling::Sampler(1))?[0];
             let Size { width, height } = size;
@@ -258,8 +259,8 @@ fn start(spelling: &str, size: Size) -> Outcome<()> {
     let baking = Instant::now();
     let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ())?;
     let baked = baking.elapsed();
-    let shown = Shown { scene: &scene, geometry: &geometry, camera: &scene.camera };
-    let canvas = Canvas::new(&device, size, Outlines::Multisampled)?;
+    let shown = SceneView { scene: &scene, geometry: &geometry, camera: &scene.camera };
+    let canvas = Canvas::new(&device, size, Antialiasing::Multisampled)?;
     renderer.draw(&canvas, &shown, &maps, Lookups::TRILINEAR)?;
     canvas.read()?;
     let all = begin.elapsed();

@@ -8,7 +8,7 @@ use crate::{Device, GpuError};
 
 /// How outlines are smoothed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outlines {
+pub enum Antialiasing {
     /// Not at all: one sample a pixel.
     Sharp,
     /// By the hardware: four samples of coverage a pixel, one of shading.
@@ -17,10 +17,10 @@ pub enum Outlines {
     Parts,
 }
 
-/// Parts of a pixel on each axis, for [`Outlines::Parts`].
+/// Parts of a pixel on each axis, for [`Antialiasing::Parts`].
 pub(crate) const PARTS: usize = 4;
 
-impl Outlines {
+impl Antialiasing {
     /// Coverage samples of the target.
     pub(crate) fn samples(self) -> u32 {
         if self == Self::Multisampled { 4 } else { 1 }
@@ -45,7 +45,7 @@ pub(crate) const PLACE: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 pub struct Canvas<'a> {
     pub(crate) device: &'a Device,
     pub(crate) size: Size,
-    pub(crate) outlines: Outlines,
+    pub(crate) outlines: Antialiasing,
     /// What passes draw on.
     pub(crate) target: wgpu::TextureView,
     /// Where several samples become one; `None` where there is but one.
@@ -63,7 +63,7 @@ impl<'a> Canvas<'a> {
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
-    pub fn new(device: &'a Device, size: Size, outlines: Outlines) -> Result<Self, GpuError> {
+    pub fn new(device: &'a Device, size: Size, outlines: Antialiasing) -> Result<Self, GpuError> {
         let extent =
             wgpu::Extent3d { width: size.width as u32, height: size.height as u32, depth_or_array_layers: 1 };
         if size.area() == 0 {
@@ -89,7 +89,7 @@ impl<'a> Canvas<'a> {
         let read = wgpu::TextureUsages::TEXTURE_BINDING;
         // Where outlines are not looked for, their targets are but one pixel.
         let one = wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 };
-        let looked = if outlines == Outlines::Parts { extent } else { one };
+        let looked = if outlines == Antialiasing::Parts { extent } else { one };
         let stored = wgpu::TextureUsages::STORAGE_BINDING;
         Ok(Self {
             device,

@@ -7,17 +7,18 @@ use glam::Vec4;
 use half::f16;
 use half::slice::HalfFloatSliceExt;
 use ndfmap_core::grid::Size;
-use ndfmap_core::light::environment::{Cube, FilteredEnvironment, Kernel, Surroundings, Technique, VIEWS};
+use ndfmap_core::light::environment::{Cube, FilteredEnvironment, SceneEnvironment, Technique, VIEWS};
 use ndfmap_core::light::{ENTRIES, SplitSum};
 
 use crate::maps::{Stored, array_view, create, write};
 use crate::{Device, GpuError};
+use ndfmap_core::brdf::Microfacets;
 
 /// `Environment` in `environment.wgsl`.
 #[derive(Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct EnvironmentUniform {
-    turn: [Vec4; 3],
+    rotation: [Vec4; 3],
     irradiance: [Vec4; 9],
     size: [f32; 2],
     scale: f32,
@@ -45,7 +46,7 @@ struct Uploaded {
     of: Arc<FilteredEnvironment>,
     radiance: wgpu::TextureView,
     half_vectors: Option<wgpu::TextureView>,
-    blurred: Vec<(Kernel, wgpu::TextureView)>,
+    blurred: Vec<(Microfacets, wgpu::TextureView)>,
 }
 
 /// Half floats end at 65504: what is brighter is stored as a part of it.
@@ -76,13 +77,13 @@ impl<'a> Environments<'a> {
     }
 
     /// What the scene's passes bind.
-    pub(crate) fn bind(&self, surroundings: Option<&Surroundings>) -> Result<Bound, GpuError> {
-        let Some(surroundings) = surroundings else {
+    pub(crate) fn bind(&self, environment: Option<&SceneEnvironment>) -> Result<Bound, GpuError> {
+        let Some(environment) = environment else {
             let (radiance, half_vectors) = (self.dark_cube.clone(), self.dark.clone());
             return Ok(Bound { uniform: EnvironmentUniform::default(), radiance, half_vectors });
         };
-        let filtered = &*surroundings.filtered;
-        let turn = surroundings.to_environment();
+        let filtered = &*environment.filtered;
+        let rotation = environment.to_environment();
         let mut irradiance = [Vec4::ZERO; 9];
         for (to, from) in irradiance.iter_mut().zip(filtered.irradiance.light.coefficients()) {
             *to = from.as_vec3().extend(0.0);
@@ -91,14 +92,15 @@ impl<'a> Environments<'a> {
             to.w = least as f32;
         }
         let uniform = EnvironmentUniform {
-            turn: [turn.x_axis, turn.y_axis, turn.z_axis].map(|axis| axis.as_vec3().extend(0.0)),
+            rotation: [rotation.x_axis, rotation.y_axis, rotation.z_axis]
+                .map(|axis| axis.as_vec3().extend(0.0)),
             irradiance,
             size: [filtered.radiance.side() as f32, filtered.radiance.levels() as f32],
             scale: scale(filtered),
-            technique: surroundings.technique.index(),
+            technique: environment.technique.index(),
         };
-        self.with(surroundings, |uploaded| {
-            if surroundings.technique == Technique::Harmonics && uploaded.half_vectors.is_none() {
+        self.with(environment, |uploaded| {
+            if environment.technique == Technique::Harmonics && uploaded.half_vectors.is_none() {
                 let texels: Vec<[f32; 4]> = filtered
                     .half_vectors()
                     .coefficients()
@@ -116,26 +118,27 @@ impl<'a> Environments<'a> {
     /// What a material binds: its table, and the cubes that facets like its own have blurred.
     pub(crate) fn bind_material(
         &self,
-        surroundings: Option<&Surroundings>,
+        environment: Option<&SceneEnvironment>,
         split_sum: impl FnOnce() -> SplitSum,
     ) -> Result<(wgpu::TextureView, wgpu::TextureView), GpuError> {
-        let Some(surroundings) = surroundings else {
+        let Some(environment) = environment else {
             return Ok((self.dark.clone(), self.dark_cube.clone()));
         };
         let split_sum = split_sum();
         let size = Size { width: 2 * ENTRIES, height: ENTRIES + 1 };
         let table = self.table("what a material reflects of a white sky", size, &split_sum.texels())?;
-        if surroundings.technique != Technique::Prefiltered {
+        if environment.technique != Technique::Prefiltered {
             return Ok((table, self.dark_cube.clone()));
         }
-        let kernel = split_sum.kernel;
-        let cube = self.with(surroundings, |uploaded| {
-            if let Some((_, made)) = uploaded.blurred.iter().find(|(k, _)| *k == kernel) {
+        let microfacets = split_sum.microfacets;
+        let cube = self.with(environment, |uploaded| {
+            if let Some((_, made)) = uploaded.blurred.iter().find(|(k, _)| *k == microfacets) {
                 return Ok(made.clone());
             }
-            let filtered = &surroundings.filtered;
-            let made = self.cube("blurred environment", filtered.prefiltered(kernel), scale(filtered))?;
-            uploaded.blurred.push((kernel, made.clone()));
+            let filtered = &environment.filtered;
+            let made =
+                self.cube("blurred environment", filtered.prefiltered(microfacets), scale(filtered))?;
+            uploaded.blurred.push((microfacets, made.clone()));
             Ok(made)
         })?;
         Ok((table, cube))
@@ -143,10 +146,10 @@ impl<'a> Environments<'a> {
 
     fn with<T>(
         &self,
-        surroundings: &Surroundings,
+        environment: &SceneEnvironment,
         f: impl FnOnce(&mut Uploaded) -> Result<T, GpuError>,
     ) -> Result<T, GpuError> {
-        let of = &surroundings.filtered;
+        let of = &environment.filtered;
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
         let mut uploaded = match last.take().filter(|u| Arc::ptr_eq(&u.of, of)) {
             Some(uploaded) => uploaded,

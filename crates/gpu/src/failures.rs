@@ -3,9 +3,9 @@
 use ndfmap_core::grid::Size;
 use ndfmap_core::ndf;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{self, Scene, Staging};
+use ndfmap_core::scene::{self, Scene, SceneOptions};
 
-use crate::{Canvas, Device, Geometry, GpuError, Lookups, Maps, Outlines, Renderer, Shown};
+use crate::{Antialiasing, Canvas, Device, Geometry, GpuError, Lookups, Maps, Renderer, SceneView};
 
 /// A device with only some of the features we use; `None` skips, where the tests are not told to insist.
 fn device(features: wgpu::Features) -> Option<Device> {
@@ -20,7 +20,7 @@ fn device(features: wgpu::Features) -> Option<Device> {
 
 fn foil(size: Size) -> Scene {
     let row = scene::find("foil").unwrap_or_else(|| panic!("foil is a scene"));
-    (row.build)(&Staging { time: 0.0, map_size: size, map: None })
+    (row.build)(&SceneOptions { time: 0.0, map_size: size, map: None })
 }
 
 const SMALL: Size = Size { width: 16, height: 16 };
@@ -35,7 +35,7 @@ fn a_map_that_is_too_large_is_named() {
     let said = failed.to_string();
     assert!(said.starts_with("the map of material `foil` of 40000 × 1 in 2 layers is too large"), "{said}");
     let huge = Size { width: 100_000, height: 2 };
-    assert!(matches!(Canvas::new(&device, huge, Outlines::Sharp), Err(GpuError::TooLarge { .. })));
+    assert!(matches!(Canvas::new(&device, huge, Antialiasing::Sharp), Err(GpuError::TooLarge { .. })));
 }
 
 #[test]
@@ -59,8 +59,8 @@ fn frames_are_timed_with_and_without_a_clock_on_the_device() {
         let (scene, method) = (foil(SMALL), ndf::parse("naive").unwrap());
         let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
         let geometry = Geometry::new(&device, &scene).unwrap();
-        let shown = Shown { scene: &scene, geometry: &geometry, camera: &scene.camera };
-        let canvas = Canvas::new(&device, SMALL, Outlines::Sharp).unwrap();
+        let shown = SceneView { scene: &scene, geometry: &geometry, camera: &scene.camera };
+        let canvas = Canvas::new(&device, SMALL, Antialiasing::Sharp).unwrap();
         let renderer = Renderer::new(&device).unwrap();
         let ms = renderer.time(&canvas, &shown, &maps, Lookups::TRILINEAR).unwrap();
         assert!(ms > 0.0 && ms < 1e4, "{ms}");
@@ -74,9 +74,9 @@ fn a_lost_device_is_an_error() {
     let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
     let geometry = Geometry::new(&device, &scene).unwrap();
     let renderer = Renderer::new(&device).unwrap();
-    let canvas = Canvas::new(&device, SMALL, Outlines::Sharp).unwrap();
+    let canvas = Canvas::new(&device, SMALL, Antialiasing::Sharp).unwrap();
     device.device.destroy();
-    let shown = Shown { scene: &scene, geometry: &geometry, camera: &scene.camera };
+    let shown = SceneView { scene: &scene, geometry: &geometry, camera: &scene.camera };
     let drawn = renderer.draw(&canvas, &shown, &maps, Lookups::TRILINEAR);
     let failed = drawn.and_then(|()| canvas.read()).err().unwrap();
     assert!(failed.to_string().contains("lost"), "{failed}");

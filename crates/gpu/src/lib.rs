@@ -19,11 +19,11 @@ mod tessellation;
 mod truth;
 mod uniforms;
 
-pub use canvas::{Canvas, Outlines};
+pub use canvas::{Antialiasing, Canvas};
 pub use device::Device;
 pub use error::GpuError;
 pub use geometry::Geometry;
 pub use maps::Maps;
-pub use renderer::{Lookups, Renderer, Sampling, Shown};
+pub use renderer::{Lookups, Renderer, Sampling, SceneView};
 pub use tessellation::Meshes;
 pub use truth::{Effort, FinestMaps, LEAST_SAMPLES, TruePicture};

@@ -1,7 +1,7 @@
 //! Linking shaders: the text of core's twins and a pass of ours, checked before any device sees it.
 
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
-use ndfmap_core::brdf::Brdf;
+use ndfmap_core::brdf::Lobe;
 use ndfmap_core::ndf::Method;
 use ndfmap_core::shader::{self, LOOKUP};
 
@@ -52,7 +52,7 @@ pub fn check(text: String) -> Result<Linked, GpuError> {
 ///
 /// # Errors
 /// [`GpuError::Shader`].
-pub fn draw(method: &dyn Method, lobe: &dyn Brdf, attributes: usize) -> Result<Linked, GpuError> {
+pub fn draw(method: &dyn Method, lobe: &dyn Lobe, attributes: usize) -> Result<Linked, GpuError> {
     let (own, lit) = (shader::link(method, lobe, attributes), shader::link_environment(method, lobe));
     check([&own, &lit, LOOKUP, SCENE, MATERIAL, SURROUNDINGS, DRAW].join("\n"))
 }
@@ -61,7 +61,7 @@ pub fn draw(method: &dyn Method, lobe: &dyn Brdf, attributes: usize) -> Result<L
 ///
 /// # Errors
 /// [`GpuError::Shader`].
-pub fn truth(lobe: &dyn Brdf) -> Result<Linked, GpuError> {
+pub fn truth(lobe: &dyn Lobe) -> Result<Linked, GpuError> {
     check([&shader::link_lobe(lobe), SCENE, MATERIAL, TRUTH].join("\n"))
 }
 

@@ -6,7 +6,7 @@ use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::lookup::{Lookup, Texels};
 use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid::{Precision, Pyramid};
-use ndfmap_core::scene::{BakedMaterial, FinishMap, Material};
+use ndfmap_core::scene::{BakedMaterial, Material, SurfaceTextures};
 use ndfmap_core::surface::{SurfaceRow, Wrap, Wraps};
 use ndfmap_core::units::SlopeVariance;
 
@@ -15,19 +15,19 @@ use crate::{Device, GpuError};
 /// A material's textures.
 pub(crate) struct Textures {
     pub(crate) map: wgpu::TextureView,
-    pub(crate) finish: wgpu::TextureView,
+    pub(crate) params: wgpu::TextureView,
     /// Attributes that the map's lobes carry.
     pub(crate) attributes: usize,
-    /// Colours in `finish`.
+    /// Colours in `params`.
     pub(crate) mapped: u32,
-    /// The least and the most gloss, where it is mapped.
-    pub(crate) gloss: Option<(SlopeVariance, SlopeVariance)>,
+    /// The least and the most roughness, where it is mapped.
+    pub(crate) roughness: Option<(SlopeVariance, SlopeVariance)>,
     pub(crate) size: Size,
     pub(crate) wraps: Wraps,
 }
 
 /// The maps of a scene's materials, baked with one method. Camera, lights, lobes, models and meshes may change after, and colours and
-/// gloss but for this: a material keeps the `finish_map` that it was baked with, or has none still.
+/// roughness but for this: a material keeps the `textures` that it was baked with, or has none still.
 pub struct Maps<'a> {
     pub(crate) method: &'a dyn Method,
     pub(crate) materials: Vec<Textures>,
@@ -60,10 +60,10 @@ impl Textures {
         let name = &material.name;
         Ok(Self {
             map: upload_pyramid(device, &format!("the map of material `{name}`"), &baked.pyramid)?,
-            finish: finish(device, name, &baked.finish, baked.pyramid.wraps(), true)?,
+            params: finish(device, name, &baked.params, baked.pyramid.wraps(), true)?,
             attributes: baked.attributes,
-            mapped: baked.finish.len() as u32,
-            gloss: material.finish_map.as_ref().map(FinishMap::gloss_range),
+            mapped: baked.params.len() as u32,
+            roughness: material.textures.as_ref().map(SurfaceTextures::roughness_range),
             size: baked.pyramid.sizes()[0],
             wraps: baked.pyramid.wraps(),
         })
@@ -82,13 +82,13 @@ impl Textures {
         let layout = Stored { layers: 1, levels: 1, format: wgpu::TextureFormat::Rgba32Float };
         let texture = create(device, &what, size, layout)?;
         write(device, &texture, 0, size, bytemuck::cast_slice(&values));
-        let grids = material.finish_map.as_ref().map_or_else(Vec::new, |map| map.grids());
+        let grids = material.textures.as_ref().map_or_else(Vec::new, |map| map.grids());
         Ok(Self {
             map: texture.create_view(&wgpu::TextureViewDescriptor::default()),
-            finish: finish(device, &material.name, &grids, wraps, false)?,
+            params: finish(device, &material.name, &grids, wraps, false)?,
             attributes: 0,
             mapped: grids.len() as u32,
-            gloss: None,
+            roughness: None,
             size,
             wraps,
         })

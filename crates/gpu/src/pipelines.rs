@@ -3,12 +3,11 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use ndfmap_core::brdf::Brdf;
+use ndfmap_core::brdf::Lobe;
 use ndfmap_core::ndf::Method;
 
-use crate::canvas::{DEPTH, Outlines, PLACE};
-use crate::link;
-use crate::{Device, GpuError};
+use crate::canvas::{Antialiasing, DEPTH, PLACE};
+use crate::{Device, GpuError, link};
 
 /// What a pipeline is kept under.
 #[derive(Clone, PartialEq, Eq, Hash)]
@@ -98,10 +97,10 @@ impl<'a> Pipelines<'a> {
     /// The pipeline that draws a method with a lobe.
     pub(crate) fn draw(
         &self,
-        (method, lobe): (&dyn Method, &dyn Brdf),
+        (method, lobe): (&dyn Method, &dyn Lobe),
         attributes: usize,
         entry: &'static str,
-        outlines: Outlines,
+        outlines: Antialiasing,
     ) -> Result<Arc<wgpu::RenderPipeline>, GpuError> {
         let key =
             Key::Draw(method.spelling(), lobe.shader().into_owned(), attributes, entry, outlines.samples());
@@ -114,10 +113,10 @@ impl<'a> Pipelines<'a> {
     }
 
     /// The pipeline that draws the truth of a lobe.
-    pub(crate) fn truth(&self, lobe: &dyn Brdf) -> Result<Arc<wgpu::RenderPipeline>, GpuError> {
+    pub(crate) fn truth(&self, lobe: &dyn Lobe) -> Result<Arc<wgpu::RenderPipeline>, GpuError> {
         self.get(Key::Truth(lobe.shader().into_owned()), || {
             let text = link::truth(lobe)?.text;
-            let outlines = Outlines::Sharp;
+            let outlines = Antialiasing::Sharp;
             let targets = [outlines.format()];
             let groups = [&self.scene, &self.finest];
             let plan = Plan { text: &text, entry: "truth", targets: &targets, groups: &groups, outlines };
@@ -129,7 +128,7 @@ impl<'a> Pipelines<'a> {
     pub(crate) fn place(&self) -> Result<Arc<wgpu::RenderPipeline>, GpuError> {
         self.get(Key::Place, || {
             let text = link::place()?.text;
-            let outlines = Outlines::Sharp;
+            let outlines = Antialiasing::Sharp;
             let groups = [&self.scene];
             let plan =
                 Plan { text: &text, entry: "place", targets: &[PLACE, PLACE], groups: &groups, outlines };
@@ -158,7 +157,7 @@ struct Plan<'a> {
     entry: &'static str,
     targets: &'a [wgpu::TextureFormat],
     groups: &'a [&'a wgpu::BindGroupLayout],
-    outlines: Outlines,
+    outlines: Antialiasing,
 }
 
 fn build(device: &Device, plan: &Plan<'_>) -> wgpu::RenderPipeline {

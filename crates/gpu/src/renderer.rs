@@ -5,9 +5,9 @@ use ndfmap_core::lookup::Filtering;
 use ndfmap_core::scene::{Camera, Material, Scene};
 
 use ndfmap_core::light::SplitSum;
-use ndfmap_core::light::environment::Surroundings;
+use ndfmap_core::light::environment::SceneEnvironment;
 
-use crate::canvas::{Canvas, Outlines, PARTS};
+use crate::canvas::{Antialiasing, Canvas, PARTS};
 use crate::environment::Environments;
 use crate::geometry::Geometry;
 use crate::maps::{Maps, Textures, sampler};
@@ -42,7 +42,7 @@ impl Lookups {
 
 /// A scene as it is now. Its triangles are those of `geometry`; materials, lights and background may have changed since.
 #[derive(Clone, Copy)]
-pub struct Shown<'a> {
+pub struct SceneView<'a> {
     /// The scene.
     pub scene: &'a Scene,
     /// Its triangles.
@@ -63,7 +63,7 @@ pub struct Renderer<'a> {
 }
 
 /// What a pass draws with: for each material its pipeline and its group.
-pub(crate) struct Dressed {
+pub(crate) struct MaterialBindings {
     pipeline: std::sync::Arc<wgpu::RenderPipeline>,
     group: wgpu::BindGroup,
 }
@@ -72,7 +72,7 @@ pub(crate) struct Dressed {
 pub(crate) struct Pass<'a> {
     pub(crate) view: View,
     /// For each material.
-    pub(crate) dressed: &'a [Dressed],
+    pub(crate) bindings: &'a [MaterialBindings],
     /// Where its beginning and its end are noted.
     pub(crate) clock: Option<&'a wgpu::QuerySet>,
 }
@@ -110,16 +110,16 @@ impl<'a> Renderer<'a> {
     pub fn draw(
         &self,
         canvas: &Canvas<'_>,
-        shown: &Shown<'_>,
+        shown: &SceneView<'_>,
         maps: &Maps<'_>,
         lookups: Lookups,
     ) -> Result<(), GpuError> {
         self.device.wait()?;
-        let dressed = self.dress(shown.scene, maps, lookups, canvas.outlines)?;
+        let bindings = self.bind_materials(shown.scene, maps, lookups, canvas.outlines)?;
         let view = View::new(shown.camera, canvas.size, shown.geometry).on(canvas, lookups.sampling);
-        self.pass(canvas, shown, &Pass { view, dressed: &dressed, clock: None })?;
+        self.pass(canvas, shown, &Pass { view, bindings: &bindings, clock: None })?;
         self.add(canvas, (0.0, 1.0), false);
-        if canvas.outlines != Outlines::Parts {
+        if canvas.outlines != Antialiasing::Parts {
             return Ok(());
         }
         self.find_outlines(canvas, shown, view)?;
@@ -130,7 +130,7 @@ impl<'a> Renderer<'a> {
             let camera = Camera { shift: shown.camera.shift - offset, ..*shown.camera };
             let moved = View::new(&camera, canvas.size, shown.geometry);
             let view = View { width: 1.0 / PARTS as f32, masked: 1, ..moved.on(canvas, lookups.sampling) };
-            self.pass(canvas, shown, &Pass { view, dressed: &dressed, clock: None })?;
+            self.pass(canvas, shown, &Pass { view, bindings: &bindings, clock: None })?;
             self.add(canvas, (if i == 0 { 0.0 } else { 1.0 }, share), true);
         }
         Ok(())
@@ -144,13 +144,13 @@ impl<'a> Renderer<'a> {
     pub fn time(
         &self,
         canvas: &Canvas<'_>,
-        shown: &Shown<'_>,
+        shown: &SceneView<'_>,
         maps: &Maps<'_>,
         lookups: Lookups,
     ) -> Result<f64, GpuError> {
-        let dressed = self.dress(shown.scene, maps, lookups, canvas.outlines)?;
+        let bindings = self.bind_materials(shown.scene, maps, lookups, canvas.outlines)?;
         let view = View::new(shown.camera, canvas.size, shown.geometry).on(canvas, lookups.sampling);
-        self.clocked(|clock| self.pass(canvas, shown, &Pass { view, dressed: &dressed, clock }))
+        self.clocked(|clock| self.pass(canvas, shown, &Pass { view, bindings: &bindings, clock }))
     }
 
     /// Milliseconds of one pass.
@@ -187,47 +187,51 @@ impl<'a> Renderer<'a> {
     }
 
     /// Pipelines and groups of the scene's materials, for a method.
-    fn dress(
+    fn bind_materials(
         &self,
         scene: &Scene,
         maps: &Maps<'_>,
         lookups: Lookups,
-        outlines: Outlines,
-    ) -> Result<Vec<Dressed>, GpuError> {
+        outlines: Antialiasing,
+    ) -> Result<Vec<MaterialBindings>, GpuError> {
         let (entry, anisotropy) = match lookups.sampling {
             _ if lookups.neighbours || !maps.method.filterable() => ("neighbours", 1),
             Sampling::Taps(_) => ("filtered", 1),
             Sampling::Sampler(taps) => ("sampled", taps),
         };
         let one = |(material, textures): (&Material, &Textures)| {
-            let lobe = &*material.reflection.lobe;
+            let lobe = &*material.brdf.lobe;
             let pipeline = self.pipelines.draw((maps.method, lobe), textures.attributes, entry, outlines)?;
             let bytes = uniforms::material(material, textures, Some(maps.method), lookups.at_means);
             let sampler = sampler(self.device, textures.wraps, anisotropy);
             let (split_sums, blurred) = self
                 .environments
-                .bind_material(scene.surroundings.as_ref(), || SplitSum::new(&material.reflection))?;
+                .bind_material(scene.environment.as_ref(), || SplitSum::new(&material.brdf))?;
             let group = self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("material"),
                 layout: &self.pipelines.material,
                 entries: &[
                     bind(0, self.uniform(&bytes).as_entire_binding()),
                     bind(1, wgpu::BindingResource::TextureView(&textures.map)),
-                    bind(2, wgpu::BindingResource::TextureView(&textures.finish)),
+                    bind(2, wgpu::BindingResource::TextureView(&textures.params)),
                     bind(3, wgpu::BindingResource::Sampler(&sampler)),
                     bind(4, wgpu::BindingResource::TextureView(&split_sums)),
                     bind(5, wgpu::BindingResource::TextureView(&blurred)),
                 ],
             });
-            Ok(Dressed { pipeline, group })
+            Ok(MaterialBindings { pipeline, group })
         };
         scene.materials.iter().zip(&maps.materials).map(one).collect()
     }
 
     /// Pipelines and groups of the scene's materials, for the truth.
-    pub(crate) fn dress_finest(&self, scene: &Scene, finest: &[Textures]) -> Result<Vec<Dressed>, GpuError> {
+    pub(crate) fn bind_finest(
+        &self,
+        scene: &Scene,
+        finest: &[Textures],
+    ) -> Result<Vec<MaterialBindings>, GpuError> {
         let one = |(material, textures): (&Material, &Textures)| {
-            let pipeline = self.pipelines.truth(&*material.reflection.lobe)?;
+            let pipeline = self.pipelines.truth(&*material.brdf.lobe)?;
             let bytes = uniforms::material(material, textures, None, false);
             let group = self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("finest"),
@@ -235,10 +239,10 @@ impl<'a> Renderer<'a> {
                 entries: &[
                     bind(0, self.uniform(&bytes).as_entire_binding()),
                     bind(1, wgpu::BindingResource::TextureView(&textures.map)),
-                    bind(2, wgpu::BindingResource::TextureView(&textures.finish)),
+                    bind(2, wgpu::BindingResource::TextureView(&textures.params)),
                 ],
             });
-            Ok(Dressed { pipeline, group })
+            Ok(MaterialBindings { pipeline, group })
         };
         scene.materials.iter().zip(finest).map(one).collect()
     }
@@ -250,17 +254,17 @@ impl<'a> Renderer<'a> {
     /// Group 0 of a pass; the mask is read only where it is not being made.
     fn scene_group(
         &self,
-        shown: &Shown<'_>,
+        shown: &SceneView<'_>,
         view: View,
         mask: &wgpu::TextureView,
     ) -> Result<wgpu::BindGroup, GpuError> {
         let geometry = shown.geometry;
         let of = |light| LightUniform::new(light, geometry.middle);
         let mut lights: Vec<LightUniform> = shown.scene.lights.iter().map(of).collect();
-        let surroundings = shown.scene.surroundings.as_ref();
-        let suns = surroundings.map_or_else(Vec::new, Surroundings::suns);
+        let environment = shown.scene.environment.as_ref();
+        let suns = environment.map_or_else(Vec::new, SceneEnvironment::suns);
         lights.extend(suns.iter().map(LightUniform::of_environment));
-        let environment = self.environments.bind(surroundings)?;
+        let environment = self.environments.bind(environment)?;
         let view = View { lights: lights.len() as u32, ..view };
         if lights.is_empty() {
             lights.push(bytemuck::Zeroable::zeroed());
@@ -288,10 +292,10 @@ impl<'a> Renderer<'a> {
     pub(crate) fn pass(
         &self,
         canvas: &Canvas<'_>,
-        shown: &Shown<'_>,
+        shown: &SceneView<'_>,
         pass: &Pass<'_>,
     ) -> Result<(), GpuError> {
-        let Pass { view, dressed, clock } = *pass;
+        let Pass { view, bindings, clock } = *pass;
         let background = shown.scene.background.as_dvec3();
         let clear = wgpu::Color { r: background.x, g: background.y, b: background.z, a: 1.0 };
         let target = wgpu::RenderPassColorAttachment {
@@ -305,7 +309,9 @@ impl<'a> Renderer<'a> {
         self.encode(canvas, &[Some(target)], clock, |pass| {
             pass.set_bind_group(0, &group, &[]);
             for part in &shown.geometry.parts {
-                let Some(Dressed { pipeline, group }) = dressed.get(part.material) else { continue };
+                let Some(MaterialBindings { pipeline, group }) = bindings.get(part.material) else {
+                    continue;
+                };
                 pass.set_pipeline(pipeline);
                 pass.set_bind_group(1, group, &[]);
                 pass.draw(part.corners.clone(), 0..1);
@@ -349,7 +355,7 @@ impl<'a> Renderer<'a> {
     }
 
     /// Marks the canvas's pixels that have an outline in them.
-    fn find_outlines(&self, canvas: &Canvas<'_>, shown: &Shown<'_>, view: View) -> Result<(), GpuError> {
+    fn find_outlines(&self, canvas: &Canvas<'_>, shown: &SceneView<'_>, view: View) -> Result<(), GpuError> {
         let pipeline = self.pipelines.place()?;
         let group = self.scene_group(shown, view, &self.no_mask)?;
         let target = |view| {

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use ndfmap_core::grid::Size;
 use ndfmap_core::lookup::Texels;
 use ndfmap_core::scene::tessellation::{HEIGHT_PIXELS, Plan, plan};
-use ndfmap_core::scene::{Camera, Object, Relief, Scene};
+use ndfmap_core::scene::{Camera, Displacement, Object, Scene};
 use ndfmap_core::surface::Wrap;
 
 use crate::geometry::{Corner, Geometry, Part, Triangle, corner, triangle};
@@ -47,7 +47,7 @@ enum Base {
         corners: Vec<u32>,
         triangles: Vec<Triangle>,
     },
-    Relief {
+    Displacement {
         vertices: wgpu::Buffer,
         corners: wgpu::Buffer,
         heights: wgpu::Buffer,
@@ -76,7 +76,7 @@ impl<'a> Meshes<'a> {
             let vertices: Vec<Corner> =
                 (0..object.mesh.vertices.len()).map(|i| corner(&object.mesh, i, middle)).collect();
             let corners = || object.mesh.triangles.as_flattened();
-            let Some(relief) = &scene.materials[object.material].relief else {
+            let Some(displacement) = &scene.materials[object.material].displacement else {
                 let triangles =
                     object.mesh.triangles.iter().map(|t| triangle(&object.mesh, t, number)).collect();
                 return Ok(Base::Plain { vertices, corners: corners().to_vec(), triangles });
@@ -85,10 +85,10 @@ impl<'a> Meshes<'a> {
                 device.check_bytes(what, bytes.len() as u64)?;
                 Ok(device.upload(bytes, wgpu::BufferUsages::STORAGE))
             };
-            Ok(Base::Relief {
+            Ok(Base::Displacement {
                 vertices: upload("the vertices", bytemuck::cast_slice(&vertices))?,
                 corners: upload("the triangles' corners", bytemuck::cast_slice(corners()))?,
-                heights: upload("the heights", bytemuck::cast_slice(&all_heights(relief)))?,
+                heights: upload("the heights", bytemuck::cast_slice(&all_heights(displacement)))?,
             })
         };
         Ok(Self {
@@ -108,10 +108,10 @@ impl<'a> Meshes<'a> {
     /// [`GpuError`] for more triangles than the device's buffers hold.
     pub fn cut(&self, camera: &Camera, size: Size) -> Result<Geometry, GpuError> {
         let rays = camera.rays(size);
-        let plans: Vec<Option<(Plan, &Relief)>> = (self.scene.objects.iter())
+        let plans: Vec<Option<(Plan, &Displacement)>> = (self.scene.objects.iter())
             .map(|object| {
-                let relief = self.scene.materials[object.material].relief.as_ref()?;
-                Some((plan(&object.mesh, relief, &rays, size), relief))
+                let displacement = self.scene.materials[object.material].displacement.as_ref()?;
+                Some((plan(&object.mesh, displacement, &rays, size), displacement))
             })
             .collect();
         let counts = |i: usize| match (&plans[i], &self.bases[i]) {
@@ -119,7 +119,7 @@ impl<'a> Meshes<'a> {
             (None, Base::Plain { vertices, triangles, .. }) => {
                 (vertices.len() as u32, triangles.len() as u32)
             }
-            (None, Base::Relief { .. }) => (0, 0),
+            (None, Base::Displacement { .. }) => (0, 0),
         };
         let total = (0..plans.len()).map(counts).fold((0_u64, 0_u64), |(p, t), (points, triangles)| {
             (p + u64::from(points), t + u64::from(triangles))
@@ -129,12 +129,12 @@ impl<'a> Meshes<'a> {
         for (i, object) in self.scene.objects.iter().enumerate() {
             let (points, triangles) = counts(i);
             match (&plans[i], &self.bases[i]) {
-                (Some((plan, relief)), Base::Relief { .. }) => {
+                (Some((plan, displacement)), Base::Displacement { .. }) => {
                     let cut = Cut {
                         eye: (rays.eye - self.middle).as_vec3(),
                         width: (HEIGHT_PIXELS * rays.right.length()) as f32,
                         object: i as u32 + 1,
-                        ..of_relief(relief, plan, first)
+                        ..of_displaced(displacement, plan, first)
                     };
                     self.expand(&geometry, i, &cut, plan);
                 }
@@ -142,7 +142,7 @@ impl<'a> Meshes<'a> {
                     let corners: Vec<u32> = corners.iter().map(|c| c + first.0).collect();
                     geometry.fill(self.device, (vertices, &corners, triangles), first);
                 }
-                (None, Base::Relief { .. }) => {}
+                (None, Base::Displacement { .. }) => {}
             }
             parts.push(Part { material: object.material, corners: 3 * first.1..3 * (first.1 + triangles) });
             first = (first.0 + points, first.1 + triangles);
@@ -152,7 +152,7 @@ impl<'a> Meshes<'a> {
 
     /// Works out points and triangles of one mesh.
     fn expand(&self, geometry: &Geometry, object: usize, cut: &Cut, plan: &Plan) {
-        let Base::Relief { vertices, corners, heights } = &self.bases[object] else { return };
+        let Base::Displacement { vertices, corners, heights } = &self.bases[object] else { return };
         if plan.patches.is_empty() {
             return;
         }
@@ -185,15 +185,15 @@ impl<'a> Meshes<'a> {
 }
 
 /// What does not change from picture to picture, and the plan's numbers.
-fn of_relief(relief: &Relief, plan: &Plan, (first_point, first_triangle): (u32, u32)) -> Cut {
-    let (finest, wraps) = (relief.heights_size(), relief.heights.wraps());
+fn of_displaced(displacement: &Displacement, plan: &Plan, (first_point, first_triangle): (u32, u32)) -> Cut {
+    let (finest, wraps) = (displacement.heights_size(), displacement.heights.wraps());
     let bit = |wrap: Wrap, bit: u32| if wrap == Wrap::Repeat { bit } else { 0 };
     Cut {
         texels: [finest.width as u32, finest.height as u32],
-        levels: relief.heights.sizes().len() as u32,
+        levels: displacement.heights.sizes().len() as u32,
         repeat: bit(wraps.x, 1) | bit(wraps.y, 2),
-        depth: relief.depth as f32,
-        texture_width: relief.width as f32,
+        depth: displacement.depth as f32,
+        texture_width: displacement.width as f32,
         patches: plan.patches.len() as u32,
         points: plan.points,
         triangles: plan.triangles,
@@ -204,10 +204,10 @@ fn of_relief(relief: &Relief, plan: &Plan, (first_point, first_triangle): (u32, 
 }
 
 /// Heights of all levels, finest first.
-fn all_heights(relief: &Relief) -> Vec<f32> {
+fn all_heights(displacement: &Displacement) -> Vec<f32> {
     let level = |(level, size): (usize, &Size)| {
         let (width, area) = (size.width, size.area());
-        (0..area).map(move |i| relief.heights.texel(level, i % width, i / width)[0])
+        (0..area).map(move |i| displacement.heights.texel(level, i % width, i / width)[0])
     };
-    relief.heights.sizes().iter().enumerate().flat_map(level).collect()
+    displacement.heights.sizes().iter().enumerate().flat_map(level).collect()
 }

@@ -8,9 +8,9 @@ use ndfmap_core::grid::Grid;
 use ndfmap_core::metrics::{Picture, relative_l2};
 use ndfmap_core::scene::{Camera, Material};
 
-use crate::canvas::{Canvas, Outlines};
+use crate::canvas::{Antialiasing, Canvas};
 use crate::maps::Textures;
-use crate::renderer::{Pass, Renderer, Shown};
+use crate::renderer::{Pass, Renderer, SceneView};
 use crate::uniforms::View;
 use crate::{Device, GpuError};
 
@@ -67,12 +67,12 @@ impl Renderer<'_> {
     pub fn truth(
         &self,
         canvas: &Canvas<'_>,
-        shown: &Shown<'_>,
+        shown: &SceneView<'_>,
         finest: &FinestMaps,
         effort: &Effort<'_>,
     ) -> Result<TruePicture, GpuError> {
-        assert_eq!(canvas.outlines, Outlines::Sharp, "the truth smooths outlines by itself");
-        let dressed = self.dress_finest(shown.scene, &finest.materials)?;
+        assert_eq!(canvas.outlines, Antialiasing::Sharp, "the truth smooths outlines by itself");
+        let bindings = self.bind_finest(shown.scene, &finest.materials)?;
         let rounds = effort.samples.div_ceil(LEAST_SAMPLES).max(1);
         let mut halves = [vec![DVec3::ZERO; canvas.size.area()], vec![DVec3::ZERO; canvas.size.area()]];
         let mut done = 0;
@@ -86,7 +86,7 @@ impl Renderer<'_> {
                     for stratum in 0..STRATA * STRATA {
                         let number = (2 * round + half) * STRATA * STRATA + stratum;
                         let view = jittered(shown, canvas, stratum, number as u32);
-                        self.pass(canvas, shown, &Pass { view, dressed: &dressed, clock: None })?;
+                        self.pass(canvas, shown, &Pass { view, bindings: &bindings, clock: None })?;
                         let first = round == done && stratum == 0;
                         self.add(canvas, (if first { 0.0 } else { 1.0 }, 1.0), false);
                     }
@@ -119,7 +119,7 @@ impl Renderer<'_> {
 const MOST_ROUNDS: usize = 64;
 
 /// What is seen through a stratum of every pixel, somewhere in it.
-fn jittered(shown: &Shown<'_>, canvas: &Canvas<'_>, stratum: usize, number: u32) -> View {
+fn jittered(shown: &SceneView<'_>, canvas: &Canvas<'_>, stratum: usize, number: u32) -> View {
     let [u, v] = [0, 1].map(|axis| f64::from(scramble(number.wrapping_mul(2) + axis)) / f64::from(u32::MAX));
     let corner = DVec2::new((stratum % STRATA) as f64, (stratum / STRATA) as f64);
     let offset = (corner + DVec2::new(u, v)) / STRATA as f64 - 0.5;

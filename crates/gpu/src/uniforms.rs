@@ -112,23 +112,23 @@ pub(crate) fn material(
     method: Option<&dyn Method>,
     at_means: bool,
 ) -> Vec<u8> {
-    let (finish, size, wraps, mapped) = (material.finish, textures.size, textures.wraps, textures.mapped);
+    let (params, size, wraps, mapped) = (material.params, textures.size, textures.wraps, textures.mapped);
     let bit = |wrap: Wrap, bit: u32| if wrap == Wrap::Repeat { bit } else { 0 };
-    let gloss = finish.gloss.get() as f32;
+    let roughness = params.roughness.get() as f32;
     let mut bytes = Vec::new();
     let mut four = |values: [[u8; 4]; 4]| bytes.extend(values.as_flattened());
     let f = |v: f64| (v as f32).to_le_bytes();
     let of = |c: DVec3, w: f32| [f(c.x), f(c.y), f(c.z), w.to_le_bytes()];
-    four(of(finish.diffuse, gloss));
-    four(of(finish.specular, 0.0));
+    four(of(params.diffuse, roughness));
+    four(of(params.specular, 0.0));
     let repeat = bit(wraps.x, 1) | bit(wraps.y, 2);
     four([f(size.width as f64), f(size.height as f64), mapped.to_le_bytes(), repeat.to_le_bytes()]);
-    let reflection = &material.reflection;
-    let model = reflection.model.index().to_le_bytes();
-    let (least, most) = textures.gloss.unwrap_or((finish.gloss, finish.gloss));
-    four([f(reflection.lobe.base()), model, u32::from(at_means).to_le_bytes(), f(least.get())]);
+    let brdf = &material.brdf;
+    let shading = brdf.shading.index().to_le_bytes();
+    let (least, most) = textures.roughness.unwrap_or((params.roughness, params.roughness));
+    four([f(brdf.lobe.base()), shading, u32::from(at_means).to_le_bytes(), f(least.get())]);
     four([f(most.get() - least.get()), [0; 4], [0; 4], [0; 4]]);
-    let table = method.map_or_else(|| vec![[0.0; 12]], |method| method.shader_table(reflection, least, most));
+    let table = method.map_or_else(|| vec![[0.0; 12]], |method| method.shader_table(brdf, least, most));
     table.as_flattened().as_chunks::<4>().0.iter().for_each(|entry| four(entry.map(f32::to_le_bytes)));
     bytes
 }

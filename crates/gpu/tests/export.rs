@@ -5,7 +5,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use ndfmap_core::reflection::{Model, Reflection};
+use ndfmap_core::brdf::{Brdf, ShadingModel};
 use ndfmap_core::{brdf, ndf};
 use ndfmap_gpu::export::{Export, TABLE};
 
@@ -35,9 +35,9 @@ fn all(language: &str) -> Vec<(String, Vec<u8>)> {
         // Every lobe and model comes up, though not with every method.
         let lobes: Vec<&str> = brdf::TABLE.iter().map(|row| row.samples[0]).collect();
         let lobe = brdf::parse(lobes[at % lobes.len()]).unwrap();
-        let reflection = Reflection { lobe, model: Model::ALL[at % Model::ALL.len()] };
+        let brdf = Brdf { lobe, shading: ShadingModel::ALL[at % ShadingModel::ALL.len()] };
         let method = ndf::parse(spelling).unwrap();
-        let export = Export { method: &*method, reflection: &reflection };
+        let export = Export { method: &*method, brdf: &brdf };
         let bytes = export.to(language).unwrap_or_else(|e| panic!("{spelling}: {e}"));
         shaders.push((format!("{at}"), bytes));
     }

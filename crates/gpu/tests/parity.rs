@@ -12,15 +12,13 @@ mod common;
 use common::device;
 use glam::{DVec3, Mat2, Vec3};
 use ndfmap_core::bake::Bake;
-use ndfmap_core::brdf;
+use ndfmap_core::brdf::{Brdf, Directions, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::Size;
 use ndfmap_core::lookup::Lookup;
-use ndfmap_core::ndf::{self, FilteredTexel, Lit, Method};
-use ndfmap_core::procedural;
+use ndfmap_core::ndf::{self, FilteredTexel, IncidentLight, Method};
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::reflection::{Finish, Model, Reflection, Way};
-use ndfmap_core::shader;
 use ndfmap_core::units::SlopeVariance;
+use ndfmap_core::{brdf, procedural, shader};
 use ndfmap_gpu::Device;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -34,7 +32,7 @@ const INPUT_STEP: f32 = 4.8e-7;
 /// One evaluation: a material, a way, a texel.
 #[derive(Clone, Debug)]
 struct Probe {
-    finish: Finish,
+    params: SurfaceParams,
     wi: Vec3,
     wo: Vec3,
     /// The normal of a facet.
@@ -81,18 +79,18 @@ fn probes(method: &dyn Method, count: usize) -> Vec<Probe> {
             49 => channels.iter_mut().skip(4).for_each(|c| *c = 0.0),
             _ => {}
         }
-        let gloss = if i.is_multiple_of(4) { 0.05 * random.random::<f64>() } else { 0.0 };
+        let roughness = if i.is_multiple_of(4) { 0.05 * random.random::<f64>() } else { 0.0 };
         let colour = |random: &mut Pcg64Mcg| DVec3::from(random.random::<[f32; 3]>().map(f64::from));
-        let finish = Finish {
+        let params = SurfaceParams {
             diffuse: colour(&mut random),
             specular: colour(&mut random),
-            gloss: SlopeVariance::clamped(f64::from(gloss as f32)),
+            roughness: SlopeVariance::clamped(f64::from(roughness as f32)),
         };
         let [wi, wo, normal] = [(); 3].map(|()| towards(&mut random));
         let [a, b, c, d]: [f32; 4] = random.random();
         let by = Mat2::from_cols_array(&[0.5 + a, 0.6 * b - 0.3, 0.6 * c - 0.3, 0.5 + d]);
         let (at_means, below) = (i.is_multiple_of(5), i % 3 == 1);
-        Probe { finish, wi, wo, normal, at_means, channels, by, below }
+        Probe { params, wi, wo, normal, at_means, channels, by, below }
     };
     (0..count).map(probe).collect()
 }
@@ -100,18 +98,18 @@ fn probes(method: &dyn Method, count: usize) -> Vec<Probe> {
 /// What both are asked, with the same numbers.
 struct Question<'a> {
     method: &'a dyn Method,
-    reflection: &'a Reflection,
+    brdf: &'a Brdf,
 }
 
 impl Question<'_> {
     /// The inputs as the shader takes them; the second result says which may be moved, and by how much.
     fn pack(&self, probe: &Probe, out: &mut Vec<f32>) {
-        let table = self.method.shader_table(self.reflection, probe.finish.gloss, probe.finish.gloss);
-        let Finish { diffuse, specular, gloss } = probe.finish;
-        let gloss = gloss.get() as f32;
-        let base = self.reflection.lobe.base() as f32;
-        out.extend([base, self.reflection.model.index() as f32, f32::from(probe.at_means), gloss]);
-        out.extend(diffuse.as_vec3().extend(gloss).to_array());
+        let table = self.method.shader_table(self.brdf, probe.params.roughness, probe.params.roughness);
+        let SurfaceParams { diffuse, specular, roughness } = probe.params;
+        let roughness = roughness.get() as f32;
+        let base = self.brdf.lobe.base() as f32;
+        out.extend([base, self.brdf.shading.index() as f32, f32::from(probe.at_means), roughness]);
+        out.extend(diffuse.as_vec3().extend(roughness).to_array());
         out.extend(specular.as_vec3().extend(0.0).to_array());
         out.extend(probe.wi.extend(self.side(probe)).to_array());
         out.extend(probe.wo.extend(0.0).to_array());
@@ -128,44 +126,49 @@ impl Question<'_> {
 
     /// The twelve numbers by the CPU.
     fn answer(&self, probe: &Probe) -> [f64; OUTPUTS] {
-        let Probe { finish, wi, wo, normal, at_means, channels, by, .. } = probe;
-        let lobe = &self.reflection.lobe;
-        let way = Way::new(wi.as_dvec3(), wo.as_dvec3()).unwrap();
-        let prepared = self.method.prepare(self.reflection, finish.gloss);
+        let Probe { params, wi, wo, normal, at_means, channels, by, .. } = probe;
+        let lobe = &self.brdf.lobe;
+        let directions = Directions::new(wi.as_dvec3(), wo.as_dvec3()).unwrap();
+        let prepared = self.method.prepare(self.brdf, params.roughness);
         let texel = FilteredTexel {
             channels,
-            finish: &|_| *finish,
+            params: &|_| *params,
             prepared: &prepared,
             at_means: *at_means,
-            relief: None,
+            slope_map: None,
         };
-        let light =
-            self.method.reflect(&texel, self.reflection, &[Lit { way, irradiance: DVec3::ONE }]).to_array();
-        let eye = way.wo * DVec3::new(1.0, 1.0, self.side(probe).into());
-        let texel = FilteredTexel { relief: Some(by.as_dmat2()), ..texel };
-        let lit = Lit { way: Way::between(way.wi, eye).unwrap(), irradiance: DVec3::ONE };
-        let relief = self.method.reflect(&texel, self.reflection, &[lit]).to_array();
+        let light = self
+            .method
+            .reflect(&texel, self.brdf, &[IncidentLight { directions, irradiance: DVec3::ONE }])
+            .to_array();
+        let eye = directions.wo * DVec3::new(1.0, 1.0, self.side(probe).into());
+        let texel = FilteredTexel { slope_map: Some(by.as_dmat2()), ..texel };
+        let lit = IncidentLight {
+            directions: Directions::between(directions.wi, eye).unwrap(),
+            irradiance: DVec3::ONE,
+        };
+        let slope_map = self.method.reflect(&texel, self.brdf, &[lit]).to_array();
         // Within four deviations: beyond, what is left is nothing to what the artificial normal brings.
-        let visible = lobe.visible_area(eye.z, 0.3 + finish.gloss.get());
-        let facet = self.reflection.facet(normal.as_dvec3(), finish, &way).x;
-        let width = self.reflection.width(finish.gloss);
-        let specular = self.reflection.is_specular();
+        let visible = lobe.visible_area(eye.z, 0.3 + params.roughness.get());
+        let facet = self.brdf.facet(normal.as_dvec3(), params, &directions).x;
+        let width = self.brdf.width(params.roughness);
+        let specular = self.brdf.is_specular();
         let of_lobe = |v: f64| if specular { v } else { 0.0 };
-        let masking = if specular { lobe.masking(way.wo.z, width) } else { 1.0 };
+        let masking = if specular { lobe.masking(directions.wo.z, width) } else { 1.0 };
         let lambert = brdf::Lambert::SHARP;
-        use brdf::Brdf;
+        use brdf::Lobe;
         [
             light[0],
             light[1],
             light[2],
             facet,
-            of_lobe(lobe.evaluate_widened(finish.gloss, normal.z.into())),
+            of_lobe(lobe.evaluate_widened(params.roughness, normal.z.into())),
             of_lobe(width.get()),
             masking,
-            lambert.evaluate_widened(finish.gloss, way.wi.z),
-            relief[0],
-            relief[1],
-            relief[2],
+            lambert.evaluate_widened(params.roughness, directions.wi.z),
+            slope_map[0],
+            slope_map[1],
+            slope_map[2],
             visible,
         ]
     }
@@ -197,10 +200,10 @@ impl Question<'_> {
                 moved(other);
             }
         }
-        let specular = probe.finish.specular * (1.0 - f64::from(INPUT_STEP));
-        moved(Probe { finish: Finish { specular, ..probe.finish }, ..probe.clone() });
-        let gloss = SlopeVariance::clamped(probe.finish.gloss.get() * (1.0 + f64::from(INPUT_STEP)));
-        moved(Probe { finish: Finish { gloss, ..probe.finish }, ..probe.clone() });
+        let specular = probe.params.specular * (1.0 - f64::from(INPUT_STEP));
+        moved(Probe { params: SurfaceParams { specular, ..probe.params }, ..probe.clone() });
+        let roughness = SlopeVariance::clamped(probe.params.roughness.get() * (1.0 + f64::from(INPUT_STEP)));
+        moved(Probe { params: SurfaceParams { roughness, ..probe.params }, ..probe.clone() });
         allowed
     }
 }
@@ -229,10 +232,10 @@ fn compare(device: &Device, question: &Question<'_>, probes: &[Probe]) -> f64 {
     let name = format!(
         "{} with {} and {}",
         question.method.spelling(),
-        question.reflection.lobe.spelling(),
-        question.reflection.model.name()
+        question.brdf.lobe.spelling(),
+        question.brdf.shading.name()
     );
-    let text = shader::link(question.method, &*question.reflection.lobe, 0) + include_str!("parity.wgsl");
+    let text = shader::link(question.method, &*question.brdf.lobe, 0) + include_str!("parity.wgsl");
     let mut input = Vec::new();
     probes.iter().for_each(|p| question.pack(p, &mut input));
     let count = probes.len() as u32;
@@ -259,7 +262,7 @@ fn compare(device: &Device, question: &Question<'_>, probes: &[Probe]) -> f64 {
                 got[k],
                 answer[k],
                 allowed[k],
-                Way::new(probe.wi.as_dvec3(), probe.wo.as_dvec3()),
+                Directions::new(probe.wi.as_dvec3(), probe.wo.as_dvec3()),
                 answer[4]
             );
         }
@@ -267,8 +270,8 @@ fn compare(device: &Device, question: &Question<'_>, probes: &[Probe]) -> f64 {
     f64::from(within as u32) / f64::from(all as u32)
 }
 
-fn reflection(lobe: &str, model: Model) -> Reflection {
-    Reflection { lobe: brdf::parse(lobe).unwrap(), model }
+fn brdf(lobe: &str, shading: ShadingModel) -> Brdf {
+    Brdf { lobe: brdf::parse(lobe).unwrap(), shading }
 }
 
 #[test]
@@ -278,8 +281,8 @@ fn every_method_agrees() {
         let method = ndf::parse(spelling).unwrap();
         let probes = probes(&*method, 500);
         for (k, lobe) in ["blinn-phong:50", "ggx:0.2"].into_iter().enumerate() {
-            let reflection = reflection(lobe, Model::ALL[(at + k) % Model::ALL.len()]);
-            let share = compare(&device, &Question { method: &*method, reflection: &reflection }, &probes);
+            let brdf = brdf(lobe, ShadingModel::ALL[(at + k) % ShadingModel::ALL.len()]);
+            let share = compare(&device, &Question { method: &*method, brdf: &brdf }, &probes);
             eprintln!("{spelling} {lobe}: {:.2} % within 1e-5", 100.0 * share);
         }
     }
@@ -291,10 +294,10 @@ fn every_lobe_agrees_in_every_model() {
     let method = ndf::parse("vmf:4").unwrap();
     let probes = probes(&*method, 2000);
     for spelling in brdf::TABLE.iter().flat_map(|row| row.samples) {
-        for model in Model::ALL {
-            let reflection = reflection(spelling, model);
-            let share = compare(&device, &Question { method: &*method, reflection: &reflection }, &probes);
-            eprintln!("{spelling} {}: {:.2} % within 1e-5", model.name(), 100.0 * share);
+        for shading in ShadingModel::ALL {
+            let brdf = brdf(spelling, shading);
+            let share = compare(&device, &Question { method: &*method, brdf: &brdf }, &probes);
+            eprintln!("{spelling} {}: {:.2} % within 1e-5", shading.name(), 100.0 * share);
         }
     }
 }
@@ -306,14 +309,13 @@ fn displaced_surfaces_agree() {
         let method = ndf::parse(method).unwrap();
         let probes = probes(&*method, 2000);
         for lobe in ["beckmann:0.05", "beckmann:0.4", "ggx:0.2", "lambert"] {
-            for model in [Model::Masked, Model::Shadowed] {
-                let reflection = reflection(lobe, model);
-                let share =
-                    compare(&device, &Question { method: &*method, reflection: &reflection }, &probes);
+            for shading in [ShadingModel::Masked, ShadingModel::Shadowed] {
+                let brdf = brdf(lobe, shading);
+                let share = compare(&device, &Question { method: &*method, brdf: &brdf }, &probes);
                 eprintln!(
                     "{} {lobe} {}: {:.2} % within 1e-5",
                     method.spelling(),
-                    model.name(),
+                    shading.name(),
                     100.0 * share
                 );
             }

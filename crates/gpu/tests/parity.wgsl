@@ -16,31 +16,31 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let a = input[first];
     let b = input[first + 1u];
     let c = input[first + 2u];
-    var reflection = Reflection(a.x, u32(a.y), u32(a.z), a.w, c.w, Table());
+    var brdf = Brdf(a.x, u32(a.y), u32(a.z), a.w, c.w, Table());
     for (var k = 0u; k < 3u * TABLE; k++) {
-        reflection.table[k] = input[first + HEAD + k];
+        brdf.table[k] = input[first + HEAD + k];
     }
     var channels: Channels;
     for (var k = 0u; k < ALL_LAYERS; k++) {
         channels[k] = input[first + HEAD + 3u * TABLE + k];
     }
-    let way = way_between(input[first + 3u].xyz, input[first + 4u].xyz);
-    let plain = Finish(b.xyz, b.w, c.xyz);
+    let directions = directions_between(input[first + 3u].xyz, input[first + 4u].xyz);
+    let plain = SurfaceParams(b.xyz, b.w, c.xyz);
     var decoded = decode(&channels);
-    let light = reflect_texel(&channels, &decoded, plain, reflection, way);
-    output[3u * i] = vec4<f32>(light, facet(reflection, input[first + 5u].xyz, plain, way).x);
-    let widened = brdf_widen(a.x, b.w);
+    let light = reflect_texel(&channels, &decoded, plain, brdf, directions);
+    output[3u * i] = vec4<f32>(light, facet(brdf, input[first + 5u].xyz, plain, directions).x);
+    let widened = lobe_widen(a.x, b.w);
     output[3u * i + 1u] = vec4<f32>(
-        brdf_evaluate(widened, input[first + 5u].z),
-        brdf_variance(widened),
-        brdf_masking(way.wo.z, brdf_variance(widened)),
-        lambert_evaluate(b.w, way.wi.z),
+        lobe_evaluate(widened, input[first + 5u].z),
+        lobe_variance(widened),
+        lobe_masking(directions.wo.z, lobe_variance(widened)),
+        lambert_evaluate(b.w, directions.wi.z),
     );
     // The same texel on a displaced surface, whose base turns its back on every other eye.
     let below = input[first + 3u].w;
-    let wo = vec3<f32>(way.wo.xy, below * way.wo.z);
+    let wo = vec3<f32>(directions.wo.xy, below * directions.wo.z);
     let by = input[first + 6u];
-    let displaced = way_between(way.wi, wo);
-    let relief = reflect_displaced(&channels, &decoded, plain, reflection, displaced, mat2x2<f32>(by.xy, by.zw));
-    output[3u * i + 2u] = vec4<f32>(relief, brdf_visible_area(wo.z, 0.3 + b.w));
+    let seen_below = directions_between(directions.wi, wo);
+    let displaced = reflect_displaced(&channels, &decoded, plain, brdf, seen_below, mat2x2<f32>(by.xy, by.zw));
+    output[3u * i + 2u] = vec4<f32>(displaced, lobe_visible_area(wo.z, 0.3 + b.w));
 }

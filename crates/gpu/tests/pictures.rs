@@ -5,15 +5,16 @@
 mod common;
 
 use common::device;
-use ndfmap_core::brdf;
 use ndfmap_core::grid::{Grid, Size};
-use ndfmap_core::light::environment::{Surroundings, Technique, builtin};
+use ndfmap_core::light::environment::{SceneEnvironment, Technique, builtin};
 use ndfmap_core::lookup::Filtering;
 use ndfmap_core::metrics::{Picture, display, relative_l2};
-use ndfmap_core::ndf;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{self, FinishMap, Scene, Staging};
-use ndfmap_gpu::{Canvas, FinestMaps, Geometry, Lookups, Maps, Meshes, Outlines, Renderer, Sampling, Shown};
+use ndfmap_core::scene::{self, Scene, SceneOptions, SurfaceTextures};
+use ndfmap_core::{brdf, ndf};
+use ndfmap_gpu::{
+    Antialiasing, Canvas, FinestMaps, Geometry, Lookups, Maps, Meshes, Renderer, Sampling, SceneView,
+};
 use ndfmap_trace::filtered::{self, BakedMaps, Filtered};
 use ndfmap_trace::truth::{Effort, Truth};
 
@@ -26,7 +27,7 @@ const MAY_DIFFER: f64 = 1e-3;
 
 fn staged(name: &str, time: f64, map: usize) -> Scene {
     let size = Size { width: map, height: map };
-    (scene::find(name).unwrap().build)(&Staging { time, map_size: size, map: None })
+    (scene::find(name).unwrap().build)(&SceneOptions { time, map_size: size, map: None })
 }
 
 /// Share of pixels with a display value that is off by more than [`STEP`].
@@ -41,7 +42,7 @@ fn off(a: &Picture, b: &Picture, exposure: f32) -> f64 {
 fn every_method_draws_what_the_cpu_draws() {
     let Some(device) = device() else { return };
     let (renderer, size) = (Renderer::new(&device).unwrap(), Size { width: 240, height: 200 });
-    let canvas = Canvas::new(&device, size, Outlines::Parts).unwrap();
+    let canvas = Canvas::new(&device, size, Antialiasing::Parts).unwrap();
     let scenes = [("disk", 0.4), ("armour", 0.3), ("plane", 0.0)];
     let scenes = scenes.map(|(name, time)| (name, staged(name, time, 128)));
     let methods = ndf::TABLE.iter().flat_map(|row| &row.samples[..1]);
@@ -54,7 +55,7 @@ fn every_method_draws_what_the_cpu_draws() {
             let theirs = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
             let on_cpu = ndfmap_trace::Geometry::new(scene);
             let on_gpu = Geometry::new(&device, scene).unwrap();
-            let shown = Shown { scene, geometry: &on_gpu, camera: &scene.camera };
+            let shown = SceneView { scene, geometry: &on_gpu, camera: &scene.camera };
             let traced = Filtered { scene, geometry: &on_cpu, maps: &theirs, progress: &|_| () };
             for (filtering, neighbours) in
                 [(Filtering::TRILINEAR, false), (Filtering::anisotropic(8), spelling.contains("unaligned"))]
@@ -79,13 +80,13 @@ fn every_method_draws_what_the_cpu_draws() {
 fn the_truth_is_the_truth() {
     let Some(device) = device() else { return };
     let (renderer, size) = (Renderer::new(&device).unwrap(), Size { width: 120, height: 100 });
-    let sharp = Canvas::new(&device, size, Outlines::Sharp).unwrap();
-    let parts = Canvas::new(&device, size, Outlines::Parts).unwrap();
+    let sharp = Canvas::new(&device, size, Antialiasing::Sharp).unwrap();
+    let parts = Canvas::new(&device, size, Antialiasing::Parts).unwrap();
     let method = ndf::parse("vmf:4").unwrap();
     for (name, time) in [("disk", 0.2), ("armour", 0.5), ("v-groove", 0.5)] {
         let scene = staged(name, time, 128);
         let on_gpu = Geometry::new(&device, &scene).unwrap();
-        let shown = Shown { scene: &scene, geometry: &on_gpu, camera: &scene.camera };
+        let shown = SceneView { scene: &scene, geometry: &on_gpu, camera: &scene.camera };
         let finest = FinestMaps::new(&device, &scene.materials).unwrap();
         let ours = renderer
             .truth(
@@ -134,8 +135,8 @@ fn the_sampler_is_near_our_taps() {
     let method = ndf::parse("vmf:4").unwrap();
     let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
     let geometry = Geometry::new(&device, &scene).unwrap();
-    let shown = Shown { scene: &scene, geometry: &geometry, camera: &scene.camera };
-    let canvas = Canvas::new(&device, size, Outlines::Multisampled).unwrap();
+    let shown = SceneView { scene: &scene, geometry: &geometry, camera: &scene.camera };
+    let canvas = Canvas::new(&device, size, Antialiasing::Multisampled).unwrap();
     let draw = |sampling| {
         renderer.draw(&canvas, &shown, &maps, Lookups { sampling, ..Lookups::TRILINEAR }).unwrap();
         canvas.read().unwrap()
@@ -152,19 +153,21 @@ fn the_sampler_is_near_our_taps() {
 fn colours_and_gloss_of_maps_are_drawn_too() {
     let Some(device) = device() else { return };
     let (renderer, size) = (Renderer::new(&device).unwrap(), Size { width: 160, height: 160 });
-    let canvas = Canvas::new(&device, size, Outlines::Parts).unwrap();
+    let canvas = Canvas::new(&device, size, Antialiasing::Parts).unwrap();
     let mut scene = staged("foil", 0.5, 64);
     let map = Size { width: 64, height: 64 };
     let wave = |x: usize, k: f32| 0.5 + 0.5 * (x as f32 * k).sin();
     // Gloss as glTF has it, roughness from 0.3 to 0.95: slope variances to 0.4.
-    let gloss = |x: usize, y: usize| (0.3 + 0.65 * wave(x + 2 * y, 0.5)).powi(4) / 2.0;
-    let diffuse_gloss = Grid::from_fn(map, |x, y| [wave(x, 0.7), 0.3, wave(y, 0.2), gloss(x, y)]);
+    let roughness = |x: usize, y: usize| (0.3 + 0.65 * wave(x + 2 * y, 0.5)).powi(4) / 2.0;
+    let diffuse_roughness = Grid::from_fn(map, |x, y| [wave(x, 0.7), 0.3, wave(y, 0.2), roughness(x, y)]);
     let specular = Grid::from_fn(map, |x, y| [0.4, wave(x, 0.1), wave(y, 0.3), 1.0]);
-    scene.materials[0].finish_map =
-        Some(FinishMap { diffuse_gloss: diffuse_gloss.into(), specular: Some(specular.into()) });
+    scene.materials[0].textures = Some(SurfaceTextures {
+        diffuse_roughness: diffuse_roughness.into(),
+        specular: Some(specular.into()),
+    });
     let on_gpu = Geometry::new(&device, &scene).unwrap();
     let on_cpu = ndfmap_trace::Geometry::new(&scene);
-    let shown = Shown { scene: &scene, geometry: &on_gpu, camera: &scene.camera };
+    let shown = SceneView { scene: &scene, geometry: &on_gpu, camera: &scene.camera };
     let filtering = Filtering::anisotropic(4);
     for spelling in ["vmf:2", "gmm:3", "slopes", "toksvig", "ndm", "ndm:gaussian", "phong:1", "sh:4", "sh:7"]
     {
@@ -187,7 +190,7 @@ fn colours_and_gloss_of_maps_are_drawn_too() {
 fn displaced_scenes_are_the_cpus() {
     let Some(device) = device() else { return };
     let (renderer, size) = (Renderer::new(&device).unwrap(), Size { width: 240, height: 200 });
-    let canvas = Canvas::new(&device, size, Outlines::Parts).unwrap();
+    let canvas = Canvas::new(&device, size, Antialiasing::Parts).unwrap();
     for (name, time, shadows) in
         [("noise-sphere", 0.1, false), ("armour", 0.2, true), ("desert", 0.4, false), ("plane", 0.0, true)]
     {
@@ -196,7 +199,7 @@ fn displaced_scenes_are_the_cpus() {
         let on_cpu = ndfmap_trace::Geometry::displaced(&scene, &scene.camera, size);
         let on_gpu = Meshes::new(&device, &scene).unwrap().cut(&scene.camera, size).unwrap();
         assert_eq!(on_gpu.len(), on_cpu.len(), "{name}");
-        let shown = Shown { scene: &scene, geometry: &on_gpu, camera: &scene.camera };
+        let shown = SceneView { scene: &scene, geometry: &on_gpu, camera: &scene.camera };
         for spelling in ["slopes", "vmf:4"] {
             let method = ndf::parse(spelling).unwrap();
             let ours = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
@@ -221,12 +224,12 @@ fn displaced_scenes_are_the_cpus() {
 /// The shares of pixels that are off, of a scene by a method on both devices.
 fn off_by(device: &ndfmap_gpu::Device, scene: &Scene, spelling: &str, size: Size) -> f64 {
     let (renderer, method) = (Renderer::new(device).unwrap(), ndf::parse(spelling).unwrap());
-    let canvas = Canvas::new(device, size, Outlines::Parts).unwrap();
+    let canvas = Canvas::new(device, size, Antialiasing::Parts).unwrap();
     let ours = Maps::new(device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
     let theirs = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
     let on_cpu = ndfmap_trace::Geometry::displaced(scene, &scene.camera, size);
     let on_gpu = Meshes::new(device, scene).unwrap().cut(&scene.camera, size).unwrap();
-    let shown = Shown { scene, geometry: &on_gpu, camera: &scene.camera };
+    let shown = SceneView { scene, geometry: &on_gpu, camera: &scene.camera };
     let traced = Filtered { scene, geometry: &on_cpu, maps: &theirs, progress: &|_| () };
     let filtering = Filtering::anisotropic(4);
     let lookups = Lookups { sampling: Sampling::Taps(filtering), neighbours: false, at_means: false };
@@ -239,7 +242,7 @@ fn off_by(device: &ndfmap_gpu::Device, scene: &Scene, spelling: &str, size: Size
 fn surrounded(mut scene: Scene, environment: &str, technique: Technique) -> Scene {
     let built = builtin::find(environment).unwrap().build();
     scene.lights.clear();
-    scene.surroundings = Some(Surroundings { technique, turn: 0.7, ..Surroundings::new(built) });
+    scene.environment = Some(SceneEnvironment { technique, rotation: 0.7, ..SceneEnvironment::new(built) });
     scene.exposure = 0.8;
     scene
 }

@@ -274,12 +274,12 @@ impl EncodedNormals {
             green,
             image,
         };
-        normals.look_over(options.convention, warnings);
+        normals.check_normals(options.convention, warnings);
         Ok(normals)
     }
 
     /// Counts what is no normal, and asks whether the convention can be right.
-    fn look_over(&self, convention: Convention, warnings: &mut Vec<String>) {
+    fn check_normals(&self, convention: Convention, warnings: &mut Vec<String>) {
         let mut row = SurfaceRow::flat(self.image.size.width);
         let below: usize = (0..self.image.size.height)
             .map(|y| {

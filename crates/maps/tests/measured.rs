@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 use glam::DVec3;
-use ndfmap_core::brdf::{Brdf, measured::published};
+use ndfmap_core::brdf::{Lobe, measured::published};
 use ndfmap_maps::merl::{parse_merl, read_merl};
 
 const BINS: usize = 90;

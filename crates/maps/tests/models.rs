@@ -5,14 +5,14 @@
 use std::path::Path;
 
 use glam::{DVec3, Vec2, Vec3};
-use ndfmap_core::scene::{Scene, Staging};
+use ndfmap_core::scene::{Scene, SceneOptions};
 use ndfmap_maps::MapError;
 use ndfmap_maps::model::{ModelOptions, TABLE, model_of_bytes, read_model};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 fn options() -> ModelOptions {
-    ModelOptions { staging: Staging::default() }
+    ModelOptions { staging: SceneOptions::default() }
 }
 
 fn read(name: &str, bytes: &[u8]) -> Result<(Scene, Vec<String>), MapError> {
@@ -109,12 +109,12 @@ fn gltf_materials_are_read() {
     // 218 is 0.71: a normal at 45 degrees, whose x is then halved by the texture's scale. 8 bits: 1/255.
     let expected = Vec3::new(0.5, 0.0, 1.0).normalize();
     assert!((row.normal(0) - Vec3::Z).length() < 0.01 && (row.normal(1) - expected).length() < 0.01);
-    let map = material.finish_map.as_ref().unwrap();
+    let map = material.textures.as_ref().unwrap();
     // glTF 2.0, appendix B: alpha = roughness²; slopes of variance alpha²/2.
-    let gloss = 0.6_f32.powi(4) / 2.0;
+    let roughness = 0.6_f32.powi(4) / 2.0;
     let close = |a: [f32; 4], b: [f32; 4]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5);
-    assert!(close(map.diffuse_gloss.row(0)[0], [0.75, 0.0, 0.0, gloss]));
-    assert!(close(map.diffuse_gloss.row(0)[1], [0.0, 0.0, 0.75, gloss]));
+    assert!(close(map.diffuse_roughness.row(0)[0], [0.75, 0.0, 0.0, roughness]));
+    assert!(close(map.diffuse_roughness.row(0)[1], [0.0, 0.0, 0.75, roughness]));
     assert!(close(map.specular.as_ref().unwrap().row(0)[0], [0.03 + 0.25, 0.03, 0.03, 1.0]));
 }
 
@@ -204,10 +204,10 @@ fn gltf_that_would_never_end_is_refused() {
 fn a_map_of_ones_own_leaves_the_mean_colour() {
     let map = ndfmap_core::procedural::find("foil").unwrap().build;
     let map = map(ndfmap_core::grid::Size::new(4, 4).unwrap());
-    let staging = Staging { map: Some(map.into()), ..Staging::default() };
+    let staging = SceneOptions { map: Some(map.into()), ..SceneOptions::default() };
     let (scene, warnings) = model_of_bytes(Path::new("a.gltf"), &gltf(), &ModelOptions { staging }).unwrap();
     assert!(warnings[0].contains("left out"), "{warnings:?}");
-    let finish = scene.materials[0].finish;
+    let params = scene.materials[0].params;
     // Half red, half blue, of metalness 0.25.
-    assert!((finish.diffuse - DVec3::new(0.375, 0.0, 0.375)).length() < 1e-5, "{finish:?}");
+    assert!((params.diffuse - DVec3::new(0.375, 0.0, 0.375)).length() < 1e-5, "{params:?}");
 }

@@ -6,8 +6,8 @@
 use std::time::Instant;
 
 use ndfmap_core::bake::{Bake, MemorySink};
-use ndfmap_core::error::{Truth, lattice_for, level_error, true_levels};
 use ndfmap_core::grid::Size;
+use ndfmap_core::measure::{TexelTruth, lattice_for, level_error, true_levels};
 use ndfmap_core::pyramid::{Layout, Precision, level_sizes};
 use ndfmap_core::surface::{Surface, SurfaceRow, Wraps};
 use ndfmap_core::{brdf, ndf, procedural};
@@ -48,13 +48,13 @@ fn timed(work: impl FnOnce()) -> f64 {
 /// Error at level 4 of the same surface at 512², blinn-phong:50.
 fn error(spelling: &str) -> Result<f64, Box<dyn std::error::Error>> {
     let surface = (procedural::find("foil").ok_or("no foil")?.build)(Size::new(512, 512)?);
-    let brdf = brdf::parse("blinn-phong:50")?;
-    let lattice = lattice_for(&*brdf);
-    let truth = Truth::new(&*surface, &*brdf, &lattice);
+    let lobe = brdf::parse("blinn-phong:50")?;
+    let lattice = lattice_for(&*lobe);
+    let truth = TexelTruth::new(&*surface, &*lobe, &lattice);
     let level = true_levels(&truth, &|_| ()).swap_remove(4);
     let method = ndf::parse(spelling)?;
     let bake = Bake { surface: &*surface, method: &*method, precision: Precision::Half, progress: &|_| () };
-    Ok(level_error(&bake.to_pyramid().0, &*method, &*brdf, &lattice, &level))
+    Ok(level_error(&bake.to_pyramid().0, &*method, &*lobe, &lattice, &level))
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -8,9 +8,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use ndfmap_core::bake::{Bake, MemorySink};
-use ndfmap_core::error::{Truth, lattice_for};
-use ndfmap_core::filtering::{FilteringError, filtering_error, true_corners};
 use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::measure::{FilteringError, TexelTruth, filtering_error, lattice_for, true_corners};
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::surface::{NormalGrid, Surface, SurfaceRow};
 use ndfmap_core::{brdf, ndf};
@@ -119,11 +118,11 @@ fn measure(map: &Path) -> Result<Vec<Vec<Vec<FilteringError>>>, Box<dyn std::err
     let surface = load(map, MOST.min(setting("NDFMAP_BENCH_SIZE", MOST)))?;
     let mut truths = Vec::new();
     for lobe in LOBES {
-        let brdf = brdf::parse(lobe)?;
-        let lattice = lattice_for(&*brdf);
+        let lobe = brdf::parse(lobe)?;
+        let lattice = lattice_for(&*lobe);
         let corners =
-            true_corners(&Truth::new(&surface, &*brdf, &lattice), surface.wraps(), &LEVELS, &|_| ());
-        truths.push((brdf, lattice, corners));
+            true_corners(&TexelTruth::new(&surface, &*lobe, &lattice), surface.wraps(), &LEVELS, &|_| ());
+        truths.push((lobe, lattice, corners));
     }
     let mut all = Vec::new();
     for spelling in METHODS {
@@ -131,8 +130,8 @@ fn measure(map: &Path) -> Result<Vec<Vec<Vec<FilteringError>>>, Box<dyn std::err
         let bake =
             Bake { surface: &surface, method: &*method, precision: Precision::Half, progress: &|_| () };
         let (pyramid, _) = bake.to_pyramid();
-        let errors = truths.iter().map(|(brdf, lattice, corners)| {
-            corners.iter().map(|c| filtering_error(&pyramid, &*method, &**brdf, lattice, c)).collect()
+        let errors = truths.iter().map(|(lobe, lattice, corners)| {
+            corners.iter().map(|c| filtering_error(&pyramid, &*method, &**lobe, lattice, c)).collect()
         });
         all.push(errors.collect());
     }

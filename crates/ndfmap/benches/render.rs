@@ -11,7 +11,7 @@ use ndfmap_core::lookup::Filtering;
 use ndfmap_core::metrics::{color_error, relative_l2};
 use ndfmap_core::ndf;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{self, Scene, Staging};
+use ndfmap_core::scene::{self, Scene, SceneOptions};
 use ndfmap_trace::Geometry;
 use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
 use ndfmap_trace::truth::{Effort, Truth};
@@ -38,7 +38,7 @@ fn square(side: usize) -> Size {
 
 fn scene(name: &str, time: f64, map: usize) -> Result<Scene, Box<dyn std::error::Error>> {
     let row = scene::find(name).ok_or("no such scene")?;
-    Ok((row.build)(&Staging { time, map_size: square(map), map: None }))
+    Ok((row.build)(&SceneOptions { time, map_size: square(map), map: None }))
 }
 
 /// Median seconds of some work.

@@ -12,15 +12,15 @@ use std::path::Path;
 use glam::DVec3;
 use ndfmap::core::brdf::{self, Lambert};
 use ndfmap::core::grid::{Grid, Size};
-use ndfmap::core::light::environment::{Surroundings, builtin};
+use ndfmap::core::light::environment::{SceneEnvironment, builtin};
 use ndfmap::core::metrics::{Picture, relative_l2};
 use ndfmap::core::ndf;
 use ndfmap::core::pyramid::Precision;
-use ndfmap::core::scene::{self, Scene, Staging};
+use ndfmap::core::scene::{self, Scene, SceneOptions};
 use ndfmap::maps::picture::write_picture;
 use ndfmap::trace::filtered::{BakedMaps, Filtered, Lookups};
 use ndfmap::trace::truth::{Effort, Truth};
-use ndfmap::trace::{Geometry, Relief};
+use ndfmap::trace::{DisplacedMeshes, Geometry};
 
 use ndfmap::core::lookup::Filtering;
 
@@ -81,7 +81,7 @@ const MIRROR: &str = "beckmann:0.07";
 
 struct Plan {
     size: Size,
-    staging: Staging,
+    staging: SceneOptions,
 }
 
 fn scene_of(plan: &Plan, table: &Table, deviation: f64) -> Result<Scene, Box<dyn std::error::Error>> {
@@ -89,15 +89,15 @@ fn scene_of(plan: &Plan, table: &Table, deviation: f64) -> Result<Scene, Box<dyn
     let mut scene = (row.build)(&plan.staging);
     if table.case == Case::Mirror {
         scene.set_brdf(&*brdf::parse(MIRROR)?);
-        scene.materials[0].finish.diffuse = DVec3::ZERO;
-        scene.materials[0].finish.specular = DVec3::ONE;
+        scene.materials[0].params.diffuse = DVec3::ZERO;
+        scene.materials[0].params.specular = DVec3::ONE;
     } else {
         scene.set_brdf(&Lambert::SHARP);
     }
     if table.case != Case::Front {
         scene.lights.clear();
         let built = builtin::find(ENVIRONMENT).ok_or("no such environment")?.build();
-        scene.surroundings = Some(Surroundings::new(built));
+        scene.environment = Some(SceneEnvironment::new(built));
     }
     scene.displace(deviation / DEVIATION, false)?;
     Ok(scene)
@@ -110,12 +110,13 @@ fn pictures(
     methods: &[&str],
 ) -> Result<Vec<Picture>, Box<dyn std::error::Error>> {
     let small = (100 * 100 / plan.size.area()).max(1);
-    let rays = if scene.surroundings.is_some() { 4 * RAYS * small } else { RAYS };
+    let rays = if scene.environment.is_some() { 4 * RAYS * small } else { RAYS };
     let effort = Effort { rays, noise: 0.0, seed: 0 };
     let flat = Geometry::new(scene);
     let normal_map = Truth::new(scene, &flat).render(&scene.camera, plan.size, &effort, &|_| ()).picture;
-    let (plain, relief) = (Geometry::without_relief(scene), Relief::new(scene));
-    let truth = Truth::displaced(scene, &plain, &relief).render(&scene.camera, plan.size, &effort, &|_| ());
+    let (plain, displacement) = (Geometry::without_displacement(scene), DisplacedMeshes::new(scene));
+    let truth =
+        Truth::displaced(scene, &plain, &displacement).render(&scene.camera, plan.size, &effort, &|_| ());
     println!("truth: {rays} rays a pixel, noise {:.4}", truth.noise);
     let mut all = vec![normal_map, truth.picture];
     let geometry = Geometry::displaced(scene, &scene.camera, plan.size);
@@ -142,7 +143,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = Path::new(arguments.first().ok_or("name a folder for the sheets")?);
     std::fs::create_dir_all(folder)?;
     let (side, map) = (number(1, 200)?, number(2, 2048)?);
-    let staging = Staging { map_size: Size::new(map, map)?, ..Staging::default() };
+    let staging = SceneOptions { map_size: Size::new(map, map)?, ..SceneOptions::default() };
     let plan = Plan { size: Size::new(side, side)?, staging };
     let wanted = arguments.get(3).map_or("", |name| name);
     for table in TABLES.iter().filter(|table| table.name.starts_with(wanted)) {

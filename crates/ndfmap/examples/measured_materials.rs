@@ -5,13 +5,12 @@
 use std::path::PathBuf;
 
 use ndfmap::core::bake::Bake;
-use ndfmap::core::brdf;
-use ndfmap::core::error::Truth;
+use ndfmap::core::measure::TexelTruth;
 use ndfmap::core::grid::Size;
-use ndfmap::core::ndf;
 use ndfmap::core::pyramid::Precision;
 use ndfmap::core::sphere::DiskLattice;
 use ndfmap::core::surface::{SlopeFilter, Wraps};
+use ndfmap::core::{brdf, ndf};
 use ndfmap::maps::source::{Convention, DEFAULT_HEIGHT_SCALE, SourceOptions, read_source};
 use rayon::prelude::*;
 
@@ -76,7 +75,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             100.0 * factors.residual.factored,
             100.0 * factors.residual.fitted
         );
-        let truth = Truth::new(&*source.surface, &*lobe, &lattice);
+        let truth = TexelTruth::new(&*source.surface, &*lobe, &lattice);
         let size = pyramids[0].sizes()[LEVEL];
         let of = |i: usize| (i % size.width, i / size.width);
         let places: Vec<(usize, usize)> =

@@ -4,9 +4,8 @@
 //! as it would be stored. A candidate's error is the worse of the two levels.
 
 use ndfmap_core::bake::Bake;
-use ndfmap_core::brdf::Brdf;
-use ndfmap_core::error::{Truth, lattice_for};
-use ndfmap_core::filtering::{filtering_error, true_corners};
+use ndfmap_core::brdf::Lobe;
+use ndfmap_core::measure::{TexelTruth, filtering_error, lattice_for, true_corners};
 use ndfmap_core::ndf;
 use ndfmap_core::pyramid::{Precision, level_sizes};
 use ndfmap_core::surface::Surface;
@@ -51,7 +50,7 @@ pub(crate) enum Limit {
 /// A choice to be made.
 pub(crate) struct Auto<'a> {
     pub(crate) surface: &'a dyn Surface,
-    pub(crate) brdf: &'a dyn Brdf,
+    pub(crate) lobe: &'a dyn Lobe,
     pub(crate) precision: Precision,
     /// Only methods whose lobes carry attributes.
     pub(crate) lobes_only: bool,
@@ -69,7 +68,7 @@ pub(crate) struct Choice {
     pub(crate) method: String,
     why: String,
     levels: Vec<usize>,
-    brdf: String,
+    lobe: String,
     candidates: Vec<Candidate>,
 }
 
@@ -82,10 +81,10 @@ impl Auto<'_> {
         })?;
         let mut levels: Vec<usize> = LEVELS.iter().map(|l| *l.min(&last)).collect();
         levels.dedup();
-        let lattice = lattice_for(self.brdf);
+        let lattice = lattice_for(self.lobe);
         let corners = {
             let progress = Progress::new("truth");
-            let truth = Truth::new(self.surface, self.brdf, &lattice);
+            let truth = TexelTruth::new(self.surface, self.lobe, &lattice);
             true_corners(&truth, self.surface.wraps(), &levels, &|f| progress.set(f))
         };
         let mut candidates = Vec::new();
@@ -105,7 +104,7 @@ impl Auto<'_> {
                 progress: &|f| progress.set(f),
             };
             let (pyramid, _) = bake.to_pyramid();
-            let error = |truth| filtering_error(&pyramid, &*method, self.brdf, &lattice, truth).filtered;
+            let error = |truth| filtering_error(&pyramid, &*method, self.lobe, &lattice, truth).filtered;
             let error = corners.iter().map(error).fold(0.0, f64::max);
             candidates.push(Candidate { method: spelling.to_owned(), bytes, error });
         }
@@ -114,7 +113,7 @@ impl Auto<'_> {
         });
         let (chosen, why) = pick(&candidates, limit)?;
         let method = candidates[chosen].method.clone();
-        Ok(Choice { method, why, levels, brdf: self.brdf.spelling(), candidates })
+        Ok(Choice { method, why, levels, lobe: self.lobe.spelling(), candidates })
     }
 }
 
@@ -155,7 +154,7 @@ impl Choice {
         let row = |c: &Candidate| json!({ "method": c.method, "bytes_per_texel": c.bytes, "error": c.error });
         json!({
             "why": self.why,
-            "brdf": self.brdf,
+            "brdf": self.lobe,
             "levels": self.levels,
             "candidates": self.candidates.iter().map(row).collect::<Vec<_>>(),
         })
@@ -164,7 +163,7 @@ impl Choice {
     /// For people.
     pub(crate) fn to_table(&self) -> String {
         let levels = self.levels.iter().map(usize::to_string).collect::<Vec<_>>().join(" and ");
-        let mut text = format!("error between texels with {}, the worst of levels {levels}:\n", self.brdf);
+        let mut text = format!("error between texels with {}, the worst of levels {levels}:\n", self.lobe);
         for c in &self.candidates {
             let mark = if c.method == self.method { "  <- chosen" } else { "" };
             text += &format!(

@@ -13,13 +13,13 @@ use ndfmap_trace::{DRIFT_FRAMES, drifted};
 use serde_json::{Map, Value, json};
 
 use crate::Failure;
-use crate::engine::{Drawn, Engine, TrueGeometry, View};
+use crate::engine::{Engine, RenderedPicture, TrueGeometry, View};
 use crate::progress::Progress;
-use crate::staging::Stage;
+use crate::staging::SceneSpec;
 
 /// What is to be rendered.
-pub(crate) struct Shot<'a> {
-    pub(crate) stage: &'a Stage,
+pub(crate) struct RenderJob<'a> {
+    pub(crate) stage: &'a SceneSpec,
     /// Times of the frames, at least one.
     pub(crate) times: &'a [f64],
     pub(crate) methods: &'a [Box<dyn Method>],
@@ -38,17 +38,17 @@ pub(crate) struct Shot<'a> {
 pub(crate) struct Frame {
     pub(crate) time: f64,
     pub(crate) exposure: f32,
-    pub(crate) truth: Option<Told>,
+    pub(crate) truth: Option<TruthReport>,
     /// How the truth changes as the camera drifts, where sparkle is measured.
-    pub(crate) drifting: Option<Drifting>,
-    pub(crate) takes: Vec<Take>,
+    pub(crate) drifting: Option<DriftReport>,
+    pub(crate) takes: Vec<MethodResult>,
     /// The truth's picture, where there is one, then each method's; none when they are not kept.
     pub(crate) pictures: Vec<Picture>,
 }
 
 /// What is said of a truth.
 #[derive(Clone, Copy)]
-pub(crate) struct Told {
+pub(crate) struct TruthReport {
     pub(crate) rays: usize,
     pub(crate) noise: f64,
     pub(crate) seconds: f64,
@@ -56,15 +56,15 @@ pub(crate) struct Told {
 
 /// What is said of one method's picture.
 #[derive(Clone, Copy)]
-pub(crate) struct Take {
+pub(crate) struct MethodResult {
     pub(crate) milliseconds: f64,
     /// Against the truth, where there is one.
-    pub(crate) errors: Option<Errors>,
+    pub(crate) errors: Option<PictureErrors>,
 }
 
 /// How far a picture is from the truth.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Errors {
+pub(crate) struct PictureErrors {
     pub(crate) relative_l2: f64,
     pub(crate) color_error: f64,
     /// Light of the whole picture over the truth's.
@@ -75,7 +75,7 @@ pub(crate) struct Errors {
 }
 
 /// Every frame, and what baking took.
-pub(crate) struct Reel {
+pub(crate) struct RenderReport {
     pub(crate) frames: Vec<Frame>,
     pub(crate) methods: Vec<String>,
     pub(crate) bake_seconds: Vec<f64>,
@@ -86,9 +86,9 @@ pub(crate) struct Reel {
 /// Renders and measures; `each` gets every frame as it is done.
 pub(crate) fn shoot<E: Engine>(
     engine: &E,
-    shot: &Shot<'_>,
+    shot: &RenderJob<'_>,
     each: &mut dyn FnMut(usize, &Frame) -> Result<(), Failure>,
-) -> Result<Reel, Failure> {
+) -> Result<RenderReport, Failure> {
     let (mut baked, mut bake_seconds) = (Vec::new(), Vec::new());
     let first = shot.stage.set(shot.times[0])?;
     for method in shot.methods {
@@ -111,12 +111,12 @@ pub(crate) fn shoot<E: Engine>(
         frames.push(frame);
     }
     let methods = shot.methods.iter().map(|m| m.spelling()).collect();
-    Ok(Reel { frames, methods, bake_seconds, engine: engine.describe() })
+    Ok(RenderReport { frames, methods, bake_seconds, engine: engine.describe() })
 }
 
 fn frame<E: Engine>(
     engine: &E,
-    shot: &Shot<'_>,
+    shot: &RenderJob<'_>,
     (scene, time): (&Scene, f64),
     baked: &[E::Maps<'_>],
 ) -> Result<Frame, Failure> {
@@ -137,41 +137,41 @@ fn frame<E: Engine>(
         let truth = geometry.truth(scene);
         true_change(&truth.drift(&scene.camera, size, effort.rays, &|f| progress.set(f)), exposure)
     });
-    let take = |maps: &E::Maps<'_>| -> Result<(Take, Picture), Failure> {
+    let take = |maps: &E::Maps<'_>| -> Result<(MethodResult, Picture), Failure> {
         let progress = Progress::new("filtered");
         let draw = |view: &View<'_, E::Set>| engine.draw(view, maps, shot.lookups, &|f| progress.set(f));
-        let Drawn { picture, milliseconds } = draw(&view)?;
-        let sparkle = |drifting: Drifting| -> Result<f64, Failure> {
+        let RenderedPicture { picture, milliseconds } = draw(&view)?;
+        let sparkle = |drifting: DriftReport| -> Result<f64, Failure> {
             let moved = |i| draw(&View { camera: drifted(&scene.camera, i), ..view }).map(|d| d.picture);
             let pictures = (0..DRIFT_FRAMES).map(moved).collect::<Result<Vec<Picture>, _>>()?;
             Ok(change(&pictures, exposure) / drifting.change.max(f64::MIN_POSITIVE))
         };
         let sparkle = drifting.map(sparkle).transpose()?;
-        let errors = truth.as_ref().map(|truth| Errors {
+        let errors = truth.as_ref().map(|truth| PictureErrors {
             relative_l2: relative_l2(&picture, &truth.picture),
             color_error: color_error(&picture, &truth.picture, exposure),
             brightness: light_of(&picture) / light_of(&truth.picture).max(f64::MIN_POSITIVE),
             flip: flip(&picture, &truth.picture, exposure),
             sparkle,
         });
-        Ok((Take { milliseconds, errors }, picture))
+        Ok((MethodResult { milliseconds, errors }, picture))
     };
     let takes = baked.iter().map(take).collect::<Result<Vec<_>, _>>()?;
-    let (takes, taken): (Vec<Take>, Vec<Picture>) = takes.into_iter().unzip();
-    let told = truth.as_ref().map(|t| Told { rays: t.rays, noise: t.noise, seconds });
+    let (takes, taken): (Vec<MethodResult>, Vec<Picture>) = takes.into_iter().unzip();
+    let told = truth.as_ref().map(|t| TruthReport { rays: t.rays, noise: t.noise, seconds });
     let pictures = truth.map(|t| t.picture).into_iter().chain(taken).collect();
     Ok(Frame { time, exposure, truth: told, drifting, takes, pictures })
 }
 
 /// How much the truth changes over a drift: [`change`] of its display values.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Drifting {
+pub(crate) struct DriftReport {
     pub(crate) change: f64,
     /// How much of that a truth of the same noise would show if nothing moved.
     pub(crate) noise: f64,
 }
 
-fn true_change([a, b]: &[Vec<Picture>; 2], exposure: f32) -> Drifting {
+fn true_change([a, b]: &[Vec<Picture>; 2], exposure: f32) -> DriftReport {
     let with = |weight: f32| -> Vec<Picture> {
         let mean = |(a, b): (&Picture, &Picture)| {
             Picture::from_fn(a.size(), |x, y| (a.row(y)[x] + weight * b.row(y)[x]) * 0.5)
@@ -182,7 +182,7 @@ fn true_change([a, b]: &[Vec<Picture>; 2], exposure: f32) -> Drifting {
     let (still, half) = (with(1.0), with(-1.0));
     let noisy: Vec<Picture> =
         half.iter().map(|d| Picture::from_fn(d.size(), |x, y| still[0].row(y)[x] + d.row(y)[x])).collect();
-    Drifting { change: change(&still, exposure), noise: change(&noisy, exposure) }
+    DriftReport { change: change(&still, exposure), noise: change(&noisy, exposure) }
 }
 
 /// All light of a picture.
@@ -211,7 +211,7 @@ fn flip(_picture: &Picture, _truth: &Picture, _exposure: f32) -> Option<f64> {
     None
 }
 
-impl Errors {
+impl PictureErrors {
     /// As JSON.
     pub(crate) fn to_json(self) -> Value {
         let mut value = json!({ "relative_l2": self.relative_l2, "color_error": self.color_error, "brightness": self.brightness });
@@ -225,13 +225,13 @@ impl Errors {
     }
 }
 
-impl Reel {
+impl RenderReport {
     /// Mean over frames of a method's errors.
-    pub(crate) fn mean_errors(&self, method: usize) -> Option<Errors> {
-        let all: Option<Vec<Errors>> = self.frames.iter().map(|f| f.takes[method].errors).collect();
+    pub(crate) fn mean_errors(&self, method: usize) -> Option<PictureErrors> {
+        let all: Option<Vec<PictureErrors>> = self.frames.iter().map(|f| f.takes[method].errors).collect();
         let all = all?;
-        let mean = |of: fn(&Errors) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
-        Some(Errors {
+        let mean = |of: fn(&PictureErrors) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
+        Some(PictureErrors {
             relative_l2: mean(|e| e.relative_l2),
             color_error: mean(|e| e.color_error),
             brightness: mean(|e| e.brightness),
@@ -312,7 +312,7 @@ impl Reel {
                     f.time, truth.rays, truth.noise, truth.seconds
                 );
             }
-            if let Some(Drifting { change, noise }) = f.drifting {
+            if let Some(DriftReport { change, noise }) = f.drifting {
                 text += &format!("drifting: it changes by {change:.4} a step, {noise:.4} of that by noise\n");
             }
         }

@@ -3,10 +3,11 @@
 use std::time::Instant;
 
 use ndfmap_core::bake::Bake;
-use ndfmap_core::brdf::Brdf;
-use ndfmap_core::error::{Truth, lattice_for, level_error, true_levels};
-use ndfmap_core::filtering::{FilteringError, filtering_error, true_corners};
+use ndfmap_core::brdf::Lobe;
 use ndfmap_core::grid::Size;
+use ndfmap_core::measure::{
+    FilteringError, TexelTruth, filtering_error, lattice_for, level_error, true_corners, true_levels,
+};
 use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid::{Precision, Pyramid, level_sizes};
 use ndfmap_core::surface::Surface;
@@ -17,7 +18,7 @@ use crate::progress::Progress;
 /// What is compared.
 pub(crate) struct Subject<'a> {
     pub(crate) surface: &'a dyn Surface,
-    pub(crate) brdf: &'a dyn Brdf,
+    pub(crate) lobe: &'a dyn Lobe,
     pub(crate) methods: &'a [Box<dyn Method>],
     pub(crate) precision: Precision,
     /// Measure between texels too.
@@ -38,18 +39,18 @@ pub(crate) struct Row {
 
 /// Everything that was measured.
 pub(crate) struct Comparison {
-    pub(crate) brdf: String,
+    pub(crate) lobe: String,
     pub(crate) sizes: Vec<Size>,
     pub(crate) rows: Vec<Row>,
 }
 
 /// Bakes and measures.
 pub(crate) fn compare(subject: &Subject<'_>) -> Comparison {
-    let lattice = lattice_for(subject.brdf);
+    let lattice = lattice_for(subject.lobe);
     let sizes = level_sizes(subject.surface.size());
     let (truths, corners) = {
         let progress = Progress::new("truth");
-        let truth = Truth::new(subject.surface, subject.brdf, &lattice);
+        let truth = TexelTruth::new(subject.surface, subject.lobe, &lattice);
         let part = if subject.filtering { 0.5 } else { 1.0 };
         let truths = true_levels(&truth, &|f| progress.set(part * f));
         // Level 0 is the map itself, filtered as it has always been.
@@ -73,9 +74,9 @@ pub(crate) fn compare(subject: &Subject<'_>) -> Comparison {
         };
         let (pyramid, _) = bake.to_pyramid();
         let bake_seconds = start.elapsed().as_secs_f64();
-        let error = |truth| level_error(&pyramid, &**method, subject.brdf, &lattice, truth);
+        let error = |truth| level_error(&pyramid, &**method, subject.lobe, &lattice, truth);
         let errors = truths.iter().map(error).collect();
-        let between = |truth| filtering_error(&pyramid, &**method, subject.brdf, &lattice, truth);
+        let between = |truth| filtering_error(&pyramid, &**method, subject.lobe, &lattice, truth);
         let filtering = corners.iter().map(between).collect();
         let bytes_per_texel = method.layers() * subject.precision.texel_bytes();
         rows.push(Row {
@@ -87,7 +88,7 @@ pub(crate) fn compare(subject: &Subject<'_>) -> Comparison {
             filtering,
         });
     }
-    Comparison { brdf: subject.brdf.spelling(), sizes, rows }
+    Comparison { lobe: subject.lobe.spelling(), sizes, rows }
 }
 
 impl Comparison {
@@ -117,7 +118,7 @@ impl Comparison {
             "map": map,
             "width": self.sizes[0].width,
             "height": self.sizes[0].height,
-            "brdf": self.brdf,
+            "brdf": self.lobe,
             "methods": methods,
         })
     }
@@ -126,7 +127,7 @@ impl Comparison {
     pub(crate) fn to_table(&self) -> String {
         let name = self.rows.iter().map(|r| r.method.len()).max().unwrap_or(0).max("level".len());
         let mut text =
-            format!("relative L2 error of the effective lobe against the truth, {}\n\n", self.brdf);
+            format!("relative L2 error of the effective lobe against the truth, {}\n\n", self.lobe);
         text += &format!("{:name$}  bytes  bake ms", "level");
         for (level, _) in self.sizes.iter().enumerate() {
             text += &format!(" {level:>6}");

@@ -4,12 +4,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec3;
-use ndfmap_core::brdf::Brdf;
+use ndfmap_core::brdf::{Lobe, ShadingModel};
 use ndfmap_core::grid::Size;
 use ndfmap_core::light::Light;
-use ndfmap_core::light::environment::Surroundings;
-use ndfmap_core::reflection::Model;
-use ndfmap_core::scene::{self, Camera, Scene, Staging};
+use ndfmap_core::light::environment::SceneEnvironment;
+use ndfmap_core::scene::{self, Camera, Scene, SceneOptions};
 use ndfmap_core::surface::Surface;
 use ndfmap_maps::model::{ModelOptions, read_model};
 
@@ -17,15 +16,15 @@ use crate::Failure;
 
 /// A scene as asked for; what is `None` or empty stays as the scene has it.
 #[derive(Clone, Default)]
-pub(crate) struct Stage {
+pub(crate) struct SceneSpec {
     /// Name of a built-in scene, or a model file.
     pub(crate) scene: String,
     /// Map of the first material.
     pub(crate) map: Option<Arc<dyn Surface>>,
     /// Size of built-in maps.
     pub(crate) map_size: Option<Size>,
-    pub(crate) brdf: Option<Arc<dyn Brdf>>,
-    pub(crate) model: Option<Model>,
+    pub(crate) lobe: Option<Arc<dyn Lobe>>,
+    pub(crate) shading: Option<ShadingModel>,
     pub(crate) camera: Option<CameraArgument>,
     pub(crate) lights: Vec<Light>,
     /// Colours of the first material.
@@ -33,22 +32,22 @@ pub(crate) struct Stage {
     pub(crate) specular: Option<DVec3>,
     pub(crate) exposure: Option<f64>,
     /// Let heights displace meshes.
-    pub(crate) displacement: Option<Displacement>,
+    pub(crate) displacement: Option<DisplacementOptions>,
     /// Light from everywhere, in place of the scene's own lights.
-    pub(crate) environment: Option<TurningEnvironment>,
+    pub(crate) environment: Option<RotatingEnvironment>,
 }
 
 /// An environment that turns as time goes.
 #[derive(Clone)]
-pub(crate) struct TurningEnvironment {
-    pub(crate) surroundings: Surroundings,
+pub(crate) struct RotatingEnvironment {
+    pub(crate) environment: SceneEnvironment,
     /// In radians, at time 0 and at time 1.
-    pub(crate) turn: [f64; 2],
+    pub(crate) rotation: [f64; 2],
 }
 
 /// How heights displace meshes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Displacement {
+pub(crate) struct DisplacementOptions {
     /// Times what keeps their slopes.
     pub(crate) scale: f64,
     pub(crate) shadows: bool,
@@ -62,11 +61,11 @@ pub(crate) struct CameraArgument {
     pub(crate) degrees: Option<f64>,
 }
 
-impl Stage {
+impl SceneSpec {
     /// True for a scene that depends on time; models do not, but their light may.
     pub(crate) fn moves(&self) -> bool {
         scene::find(&self.scene).is_some()
-            || self.environment.as_ref().is_some_and(|e| e.turn[0] != e.turn[1])
+            || self.environment.as_ref().is_some_and(|e| e.rotation[0] != e.rotation[1])
     }
 
     /// Gives the first material the colours that were asked for.
@@ -74,15 +73,15 @@ impl Stage {
         if let Some(first) = scene.materials.first_mut()
             && (self.diffuse.is_some() || self.specular.is_some())
         {
-            first.finish.diffuse = self.diffuse.unwrap_or(first.finish.diffuse);
-            first.finish.specular = self.specular.unwrap_or(first.finish.specular);
-            first.finish_map = None;
+            first.params.diffuse = self.diffuse.unwrap_or(first.params.diffuse);
+            first.params.specular = self.specular.unwrap_or(first.params.specular);
+            first.textures = None;
         }
     }
 
     /// The scene at a time.
     pub(crate) fn set(&self, time: f64) -> Result<Scene, Failure> {
-        let mut staging = Staging { time, map: self.map.clone(), ..Staging::default() };
+        let mut staging = SceneOptions { time, map: self.map.clone(), ..SceneOptions::default() };
         if let Some(size) = self.map_size {
             staging.map_size = size;
         }
@@ -96,18 +95,18 @@ impl Stage {
             }
         };
         self.colour(&mut scene);
-        if let Some(brdf) = &self.brdf {
-            scene.set_brdf(&**brdf);
-            if brdf.measured().is_some() {
+        if let Some(lobe) = &self.lobe {
+            scene.set_brdf(&**lobe);
+            if lobe.measured().is_some() {
                 // It has brought its own.
                 self.colour(&mut scene);
             }
         }
-        if let Some(model) = self.model {
-            scene.set_model(model);
+        if let Some(shading) = self.shading {
+            scene.set_shading(shading);
         }
-        if let Some(Displacement { scale, shadows }) = self.displacement {
-            if let Some(measured) = self.brdf.as_ref().filter(|brdf| brdf.measured().is_some()) {
+        if let Some(DisplacementOptions { scale, shadows }) = self.displacement {
+            if let Some(measured) = self.lobe.as_ref().filter(|lobe| lobe.measured().is_some()) {
                 let why = "a measured lobe is none of microfacets, which displaced surfaces are made of";
                 return Err(Failure::Usage(format!("--displace: {}: {why}", measured.spelling())));
             }
@@ -122,9 +121,9 @@ impl Stage {
         if !self.lights.is_empty() || self.environment.is_some() {
             scene.lights.clone_from(&self.lights);
         }
-        if let Some(TurningEnvironment { surroundings, turn: [from, to] }) = &self.environment {
-            let turn = from + (to - from) * time;
-            scene.surroundings = Some(Surroundings { turn, ..surroundings.clone() });
+        if let Some(RotatingEnvironment { environment, rotation: [from, to] }) = &self.environment {
+            let rotation = from + (to - from) * time;
+            scene.environment = Some(SceneEnvironment { rotation, ..environment.clone() });
         }
         if let Some(exposure) = self.exposure {
             scene.exposure = exposure as f32;

@@ -229,7 +229,7 @@ fn tables_in_the_documents_are_those_of_the_code() {
     for row in ndfmap_core::scene::TABLE {
         assert!(scenes.contains(&format!("`{}`", row.name)), "docs/scenes.md lacks {}", row.name);
     }
-    for model in ndfmap_core::reflection::Model::ALL {
+    for model in ndfmap_core::brdf::ShadingModel::ALL {
         assert!(scenes.contains(&format!("`{}`", model.name())), "docs/scenes.md lacks {}", model.name());
     }
     #[cfg(feature = "gpu")]

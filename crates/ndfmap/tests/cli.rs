@@ -97,7 +97,7 @@ fn attributes_stay_with_their_lobes() {
     // Left-facing texels are red, right-facing ones green, in a checkerboard: the coarsest texel has two lobes, each of
     // its own colour, where an average would be brown.
     let folder = tempfile::tempdir().unwrap();
-    let [normal, albedo, gloss, small, file] =
+    let [normal, albedo, roughness, small, file] =
         ["n.png", "a.png", "g.png", "s.png", "map.ktx2"].map(|n| text(&folder.path().join(n)));
     let left = |x: u32, y: u32| (x + y).is_multiple_of(2);
     picture(&normal, png::ColorType::Rgb, 16, 16, |x, y| vec![if left(x, y) { 68 } else { 188 }, 128, 240]);
@@ -108,7 +108,7 @@ fn attributes_stay_with_their_lobes() {
         16,
         |x, y| if left(x, y) { vec![188, 0, 0] } else { vec![0, 188, 0] },
     );
-    picture(&gloss, png::ColorType::Grayscale, 16, 16, |x, y| vec![if left(x, y) { 51 } else { 204 }]);
+    picture(&roughness, png::ColorType::Grayscale, 16, 16, |x, y| vec![if left(x, y) { 51 } else { 204 }]);
     picture(&small, png::ColorType::Grayscale, 8, 16, |_, _| vec![0]);
     for (zstd, method) in [(false, "vmf:2"), (true, "gmm:2")] {
         let srgb = format!("srgb:{albedo}");
@@ -122,7 +122,7 @@ fn attributes_stay_with_their_lobes() {
             "--attribute",
             &srgb,
             "--attribute",
-            &gloss,
+            &roughness,
             "--json",
         ];
         words.extend(zstd.then_some("--zstd"));
@@ -140,12 +140,12 @@ fn attributes_stay_with_their_lobes() {
                     let all = lobe["attributes"][name].as_array().unwrap();
                     all.iter().map(|v| v.as_f64().unwrap()).collect::<Vec<_>>()
                 };
-                let (colour, gloss) = (values("a.png"), values("g.png"));
+                let (colour, roughness) = (values("a.png"), values("g.png"));
                 // sRGB 188 is 0.5029 in linear light; half floats hold it, and its weight, to 5e-4 each.
                 let expected = if is_left { [0.5029, 0.0, 0.0] } else { [0.0, 0.5029, 0.0] };
                 assert!(colour.iter().zip(expected).all(|(c, e)| (c - e).abs() < 2e-3), "{texel}");
                 assert!(
-                    gloss.len() == 1 && (gloss[0] - if is_left { 0.2 } else { 0.8 }).abs() < 2e-3,
+                    roughness.len() == 1 && (roughness[0] - if is_left { 0.2 } else { 0.8 }).abs() < 2e-3,
                     "{texel}"
                 );
             }
@@ -154,7 +154,8 @@ fn attributes_stay_with_their_lobes() {
     let (status, _, said) = outcome(&["bake", &normal, "-o", &file, "-m", "vmf:2", "--attribute", &small]);
     assert!(status == 1 && said.contains("must be as large as the map, 16 × 16"), "{said}");
     for method in ["slopes", "phong:2"] {
-        let (status, _, said) = outcome(&["bake", &normal, "-o", &file, "-m", method, "--attribute", &gloss]);
+        let (status, _, said) =
+            outcome(&["bake", &normal, "-o", &file, "-m", method, "--attribute", &roughness]);
         assert!(status == 2 && said.contains("no lobes that carry attributes"), "{said}");
     }
 }

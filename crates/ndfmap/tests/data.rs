@@ -89,9 +89,9 @@ fn errors_on_real_maps_agree_with_the_independent_program() {
     ];
     for (map, s, expected) in table {
         let path = data.join("normal").join(map).display().to_string();
-        let brdf = format!("blinn-phong:{s}");
+        let lobe = format!("blinn-phong:{s}");
         let told =
-            json(&["compare", &path, "--brdf", &brdf, "--methods", "naive,toksvig,slopes,sh:7", "--json"]);
+            json(&["compare", &path, "--brdf", &lobe, "--methods", "naive,toksvig,slopes,sh:7", "--json"]);
         for (method, expected) in ["naive", "toksvig", "slopes", "sh:7"].iter().zip(expected) {
             let got = told["methods"][method]["levels"][6]["error"].as_f64().unwrap();
             eprintln!(
@@ -118,8 +118,8 @@ fn fitted_lobes_are_at_least_as_good_as_the_independent_program() {
     let methods = ["vmf:1", "vmf:2", "vmf:4", "vmf:6", "gmm:4"];
     for (map, s, expected) in table {
         let path = data.join("normal").join(map).display().to_string();
-        let brdf = format!("blinn-phong:{s}");
-        let told = json(&["compare", &path, "--brdf", &brdf, "--methods", &methods.join(","), "--json"]);
+        let lobe = format!("blinn-phong:{s}");
+        let told = json(&["compare", &path, "--brdf", &lobe, "--methods", &methods.join(","), "--json"]);
         for (method, expected) in methods.iter().zip(expected) {
             let got = told["methods"][method]["levels"][6]["error"].as_f64().unwrap();
             eprintln!(

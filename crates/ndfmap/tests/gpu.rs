@@ -58,7 +58,7 @@ fn the_gpu_draws_the_film_that_the_cpu_draws() {
     if !has_gpu(folder.path()) {
         return;
     }
-    // The drying creature: four materials whose gloss and colours change with time, baked once.
+    // The drying creature: four materials whose roughness and colours change with time, baked once.
     let film = "render --scene creature --frames 2 --size 240x180 --map-size 64 --method vmf:2,slopes";
     let on_gpu = json(folder.path(), &format!("{film} --device gpu -o gpu.png"));
     let on_cpu = json(folder.path(), &format!("{film} --device cpu -o cpu.png"));

@@ -74,8 +74,8 @@ impl Geometry {
 
     /// Only the meshes that have no relief.
     #[must_use]
-    pub fn without_relief(scene: &Scene) -> Self {
-        let bare = |o: &Object| match scene.materials[o.material].relief {
+    pub fn without_displacement(scene: &Scene) -> Self {
+        let bare = |o: &Object| match scene.materials[o.material].displacement {
             Some(_) => Object { mesh: Mesh::default().into(), ..o.clone() },
             None => o.clone(),
         };
@@ -84,9 +84,9 @@ impl Geometry {
 
     fn of(scene: &Scene, objects: &[Object]) -> Self {
         let (mut triangles, mut stretches) = (Vec::new(), Vec::new());
-        let relief = scene.has_relief();
+        let displacement = scene.is_displaced();
         for (object, o) in objects.iter().enumerate() {
-            if relief {
+            if displacement {
                 let at = |i: u32| o.mesh.stretches.get(i as usize).copied().unwrap_or(Mat2::NAN);
                 stretches.extend(o.mesh.triangles.iter().map(|t| t.map(at)));
             }

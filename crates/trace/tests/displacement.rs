@@ -7,20 +7,20 @@ use std::sync::Arc;
 
 use glam::{DMat2, DVec2, DVec3, Vec3};
 use ndfmap_core::bake::Bake;
+use ndfmap_core::brdf::{Brdf, Directions, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
 use ndfmap_core::lookup::Filtering;
 use ndfmap_core::metrics::Picture;
-use ndfmap_core::ndf::{self, FilteredTexel, Lit, Method};
+use ndfmap_core::ndf::{self, FilteredTexel, IncidentLight, Method};
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::reflection::{Finish, Model, Reflection, Way};
-use ndfmap_core::scene::{self, Camera, Material, Mesh, Object, Scene, Staging};
+use ndfmap_core::scene::{self, Camera, Material, Mesh, Object, Scene, SceneOptions};
 use ndfmap_core::surface::{HeightField, SlopeFilter, Surface, Wraps};
 use ndfmap_core::units::SlopeVariance;
 use ndfmap_core::{brdf, procedural};
 use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
 use ndfmap_trace::truth::{Effort, Truth};
-use ndfmap_trace::{Geometry, Relief};
+use ndfmap_trace::{DisplacedMeshes, Geometry};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
@@ -31,26 +31,26 @@ const ONE: Size = Size { width: 1, height: 1 };
 const TILES: f64 = 6.0;
 
 /// A plane of many tiles at z = 0, a tile wide each, seen from afar along `wo` by a picture a few tiles wide, lit along `wi`.
-fn plane(surface: Arc<dyn Surface>, reflection: Reflection, diffuse: f64, way: &Way) -> Scene {
+fn plane(surface: Arc<dyn Surface>, brdf: Brdf, diffuse: f64, directions: &Directions) -> Scene {
     let place = |s: f64, t: f64| DVec3::new(s - 0.5, t - 0.5, 0.0) * TILES;
     let mesh = Mesh::from_patch((6, 6), DVec2::splat(TILES), place);
     Scene {
-        camera: camera(way.wo),
+        camera: camera(directions.wo),
         objects: vec![Object { mesh: mesh.into(), material: 0 }],
         materials: vec![Material {
             name: "plane".to_owned(),
             surface,
-            finish: Finish {
+            params: SurfaceParams {
                 diffuse: DVec3::splat(diffuse),
                 specular: DVec3::splat(1.0 - diffuse),
-                gloss: SlopeVariance::ZERO,
+                roughness: SlopeVariance::ZERO,
             },
-            finish_map: None,
-            relief: None,
-            reflection,
+            textures: None,
+            displacement: None,
+            brdf,
         }],
-        lights: vec![Light::Directional { towards: way.wi, irradiance: DVec3::ONE }],
-        surroundings: None,
+        lights: vec![Light::Directional { towards: directions.wi, irradiance: DVec3::ONE }],
+        environment: None,
         background: Vec3::ZERO,
         exposure: 1.0,
     }
@@ -65,8 +65,8 @@ fn camera(wo: DVec3) -> Camera {
 
 /// What the displaced plane sends to the eye, by rays.
 fn by_rays(scene: &Scene, rays: usize) -> f64 {
-    let (geometry, relief) = (Geometry::without_relief(scene), Relief::new(scene));
-    let truth = Truth::displaced(scene, &geometry, &relief);
+    let (geometry, displacement) = (Geometry::without_displacement(scene), DisplacedMeshes::new(scene));
+    let truth = Truth::displaced(scene, &geometry, &displacement);
     truth.render(&scene.camera, ONE, &Effort { rays, noise: 0.0, seed: 5 }, &|_| ()).picture.texels()[0]
         .x
         .into()
@@ -75,20 +75,20 @@ fn by_rays(scene: &Scene, rays: usize) -> f64 {
 /// What a method makes of the whole map, in this light.
 fn by_method(scene: &Scene, channels: &[f32], method: &dyn Method, wo: DVec3) -> f64 {
     let material = &scene.materials[0];
-    let prepared = method.prepare(&material.reflection, SlopeVariance::ZERO);
+    let prepared = method.prepare(&material.brdf, SlopeVariance::ZERO);
     let texel = FilteredTexel {
         channels,
-        finish: &|_| material.finish,
+        params: &|_| material.params,
         prepared: &prepared,
         at_means: false,
-        relief: Some(DMat2::IDENTITY),
+        slope_map: Some(DMat2::IDENTITY),
     };
     let lit = |light: &Light| {
         let (wi, irradiance) = light.seen_from(DVec3::ZERO);
-        Way::between(wi, wo).map(|way| Lit { way, irradiance })
+        Directions::between(wi, wo).map(|directions| IncidentLight { directions, irradiance })
     };
-    let lights: Vec<Lit> = scene.lights.iter().filter_map(lit).collect();
-    method.reflect(&texel, &material.reflection, &lights).x
+    let lights: Vec<IncidentLight> = scene.lights.iter().filter_map(lit).collect();
+    method.reflect(&texel, &material.brdf, &lights).x
 }
 
 /// The coarsest texel of a method's map.
@@ -102,11 +102,11 @@ fn gaussian(deviations: DVec2, seed: u64) -> HeightField {
     const SIDE: usize = 384;
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let wave = |_| {
-        let [turn, radius, phase]: [f64; 3] = random.random();
+        let [rotation, radius, phase]: [f64; 3] = random.random();
         let number = 24.0 + 12.0 * radius;
         // On an ellipse, as in the noise of spheres.
         let axes = deviations / deviations.max_element() * number;
-        let k = (axes * DVec2::from_angle(TAU * turn)).round();
+        let k = (axes * DVec2::from_angle(TAU * rotation)).round();
         (k, TAU * phase)
     };
     let waves: Vec<(DVec2, f64)> = (0..200).map(wave).collect();
@@ -129,9 +129,9 @@ fn gaussian(deviations: DVec2, seed: u64) -> HeightField {
 }
 
 /// Ways of light at several heights of eye and light.
-fn ways() -> Vec<Way> {
-    let direction = |degrees: f64, turn: f64| {
-        let ((sin, cos), (up, out)) = (turn.to_radians().sin_cos(), degrees.to_radians().sin_cos());
+fn incident_directions() -> Vec<Directions> {
+    let direction = |degrees: f64, rotation: f64| {
+        let ((sin, cos), (up, out)) = (rotation.to_radians().sin_cos(), degrees.to_radians().sin_cos());
         DVec3::new(out * cos, out * sin, up)
     };
     let pairs = [
@@ -143,7 +143,10 @@ fn ways() -> Vec<Way> {
         ((40.0, 30.0), (50.0, 170.0)),
         ((30.0, 60.0), (80.0, 0.0)),
     ];
-    pairs.iter().map(|((a, b), (c, d))| Way::new(direction(*c, *d), direction(*a, *b)).unwrap()).collect()
+    pairs
+        .iter()
+        .map(|((a, b), (c, d))| Directions::new(direction(*c, *d), direction(*a, *b)).unwrap())
+        .collect()
 }
 
 fn relative_l2(pairs: &[(f64, f64)]) -> f64 {
@@ -157,10 +160,10 @@ fn lights(wi: DVec3) -> Vec<Light> {
     let light = |i: usize| {
         // Rings of 1, 6, 12 and 18.
         let ring = [1, 7, 19, 37].iter().position(|n| i < *n).unwrap();
-        let turn = DVec2::from_angle(TAU * i as f64 / (6 * ring).max(1) as f64)
+        let rotation = DVec2::from_angle(TAU * i as f64 / (6 * ring).max(1) as f64)
             * (ring as f64 / 3.0)
             * 15_f64.to_radians();
-        let towards = (wi + x * turn.x + y * turn.y).normalize();
+        let towards = (wi + x * rotation.x + y * rotation.y).normalize();
         Light::Directional { towards, irradiance: DVec3::ONE / 37.0 }
     };
     (0..37).map(light).collect()
@@ -169,23 +172,24 @@ fn lights(wi: DVec3) -> Vec<Light> {
 /// Relative L2 error of LEADR over all ways, diffuse and with this specular lobe, for slopes of these deviations.
 fn errors(deviations: DVec2, lobe: &str, surfaces: u64, rays: usize) -> [f64; 2] {
     let method = ndf::parse("slopes:9").unwrap();
-    let mut all = [vec![(0.0, 0.0); ways().len()], vec![(0.0, 0.0); ways().len()]];
+    let mut all =
+        [vec![(0.0, 0.0); incident_directions().len()], vec![(0.0, 0.0); incident_directions().len()]];
     for seed in 0..surfaces {
-        let reflection = || Reflection { lobe: brdf::parse(lobe).unwrap(), model: Model::Masked };
-        let mut scene = plane(Arc::new(gaussian(deviations, seed)), reflection(), 0.0, &ways()[0]);
+        let brdf = || Brdf { lobe: brdf::parse(lobe).unwrap(), shading: ShadingModel::Masked };
+        let mut scene = plane(Arc::new(gaussian(deviations, seed)), brdf(), 0.0, &incident_directions()[0]);
         scene.displace(1.0, false).unwrap();
         let channels = coarsest(&*scene.materials[0].surface, &*method);
-        let (geometry, relief) = (Geometry::without_relief(&scene), Relief::new(&scene));
+        let (geometry, displacement) = (Geometry::without_displacement(&scene), DisplacedMeshes::new(&scene));
         for (lobe, pairs) in ["lambert", lobe].into_iter().zip(&mut all) {
             let diffuse = if lobe == "lambert" { 1.0 } else { 0.0 };
-            scene.materials[0].reflection.lobe = brdf::parse(lobe).unwrap();
-            scene.materials[0].finish.diffuse = DVec3::splat(diffuse);
-            for (way, pair) in ways().iter().zip(pairs) {
-                scene.lights = lights(way.wi);
+            scene.materials[0].brdf.lobe = brdf::parse(lobe).unwrap();
+            scene.materials[0].params.diffuse = DVec3::splat(diffuse);
+            for (directions, pair) in incident_directions().iter().zip(pairs) {
+                scene.lights = lights(directions.wi);
                 let effort = Effort { rays, noise: 0.0, seed };
-                let truth = Truth::displaced(&scene, &geometry, &relief);
-                let picture = truth.render(&camera(way.wo), ONE, &effort, &|_| ()).picture;
-                pair.0 += by_method(&scene, &channels, &*method, way.wo);
+                let truth = Truth::displaced(&scene, &geometry, &displacement);
+                let picture = truth.render(&camera(directions.wo), ONE, &effort, &|_| ()).picture;
+                pair.0 += by_method(&scene, &channels, &*method, directions.wo);
                 pair.1 += f64::from(picture.texels()[0].x);
             }
         }
@@ -229,13 +233,13 @@ fn a_groove_displaced_is_its_two_flanks_as_seen() {
         (DVec3::new(0.0, 0.1, 1.0), DVec3::new(0.4, 0.0, 1.0)),
         (DVec3::new(1.0, 0.0, 0.9), DVec3::new(0.3, 0.2, 1.0)),
     ] {
-        let way = Way::new(wi.normalize(), wo.normalize()).unwrap();
-        let reflection = || Reflection { lobe: brdf::parse("lambert").unwrap(), model: Model::Masked };
-        let mut scene = plane(surface.clone(), reflection(), 0.8, &way);
+        let directions = Directions::new(wi.normalize(), wo.normalize()).unwrap();
+        let brdf = || Brdf { lobe: brdf::parse("lambert").unwrap(), shading: ShadingModel::Masked };
+        let mut scene = plane(surface.clone(), brdf(), 0.8, &directions);
         scene.displace(1.0, false).unwrap();
         let flanks = [-0.5, 0.5].map(|x| DVec3::new(x, 0.0, 1.0));
-        let seen = flanks.map(|n| n.dot(way.wo).max(0.0));
-        let lit = flanks.map(|n| 0.8 / PI * n.normalize().dot(way.wi).max(0.0));
+        let seen = flanks.map(|n| n.dot(directions.wo).max(0.0));
+        let lit = flanks.map(|n| 0.8 / PI * n.normalize().dot(directions.wi).max(0.0));
         let expected = (seen[0] * lit[0] + seen[1] * lit[1]) / (seen[0] + seen[1]);
         let got = by_rays(&scene, 8192);
         // Which flank a ray meets is chance: half of 1/sqrt(8192) at most of what parts them, 4.5 times; strata do better. Corners at the
@@ -255,9 +259,9 @@ fn shadows_take_what_the_relief_stands_before() {
     let surface = HeightField { heights, wraps: Wraps::default(), filter: SlopeFilter::default() };
     let elevation = 20_f64.to_radians();
     let wi = DVec3::new(elevation.cos(), 0.0, elevation.sin());
-    let way = Way::new(wi, DVec3::new(1e-4, 0.0, 1.0).normalize()).unwrap();
-    let reflection = Reflection { lobe: brdf::parse("lambert").unwrap(), model: Model::Shadowed };
-    let mut scene = plane(Arc::new(surface), reflection, 0.8, &way);
+    let directions = Directions::new(wi, DVec3::new(1e-4, 0.0, 1.0).normalize()).unwrap();
+    let brdf = Brdf { lobe: brdf::parse("lambert").unwrap(), shading: ShadingModel::Shadowed };
+    let mut scene = plane(Arc::new(surface), brdf, 0.8, &directions);
     scene.displace(1.0, true).unwrap();
     // A ridge of height 1/2 every 1, flanks of slope 1. Down the flank that faces the light from a ridge at 0 (height 1/2 - x), light comes
     // over the ridge at 1 with slope tan e: above it, z > 1/2 - (1 - x) tan e. They meet at x = tan e / (1 + tan e).
@@ -274,19 +278,20 @@ fn builtin_maps_have_the_slopes_that_are_displaced() {
     for name in ["armour", "foil", "noise"] {
         let surface: Arc<dyn Surface> =
             (procedural::find(name).unwrap().build)(Size { width: 256, height: 256 }).into();
-        let way = Way::new(DVec3::new(0.4, 0.1, 1.0).normalize(), DVec3::new(1e-4, 0.0, 1.0).normalize());
-        let reflection = Reflection { lobe: brdf::parse("lambert").unwrap(), model: Model::Masked };
-        let mut scene = plane(surface, reflection, 1.0, &way.unwrap());
+        let directions =
+            Directions::new(DVec3::new(0.4, 0.1, 1.0).normalize(), DVec3::new(1e-4, 0.0, 1.0).normalize());
+        let brdf = Brdf { lobe: brdf::parse("lambert").unwrap(), shading: ShadingModel::Masked };
+        let mut scene = plane(surface, brdf, 1.0, &directions.unwrap());
         scene.displace(1.0, false).unwrap();
-        let relief = Relief::new(&scene);
+        let displacement = DisplacedMeshes::new(&scene);
         let mut random = Pcg64Mcg::seed_from_u64(4);
         let count = 20_000;
         let (mut mean, mut second) = (DVec2::ZERO, [0.0; 3]);
         for _ in 0..count {
             let [x, y]: [f64; 2] = random.random();
             let from = DVec3::new(2.0 * x - 1.0, 2.0 * y - 1.0, 9.0);
-            let hit = relief.hit(from, DVec3::NEG_Z, f64::INFINITY).unwrap();
-            let n = relief.facet(&hit, DVec3::NEG_Z).normal;
+            let hit = displacement.hit(from, DVec3::NEG_Z, f64::INFINITY).unwrap();
+            let n = displacement.facet(&hit, DVec3::NEG_Z).normal;
             let slope = -n.truncate() / n.z;
             mean += slope / f64::from(count);
             let products = [slope.x * slope.x, slope.y * slope.y, slope.x * slope.y];
@@ -310,17 +315,17 @@ fn silhouettes_are_defined_over_a_full_turn() {
     // Specular facets lit from the eye: whatever is seen sends something back. As printed, but without the artificial normal, mean normals
     // that face away at the silhouette divide by nothing, or by less (the paper's figure 6).
     let size = Size { width: 96, height: 96 };
-    let staging = Staging { map_size: Size { width: 256, height: 256 }, ..Staging::default() };
+    let staging = SceneOptions { map_size: Size { width: 256, height: 256 }, ..SceneOptions::default() };
     let mut scene = (scene::find("noise-sphere").unwrap().build)(&staging);
     scene.displace(2.0, false).unwrap();
-    scene.materials[0].finish.diffuse = DVec3::ZERO;
+    scene.materials[0].params.diffuse = DVec3::ZERO;
     // Its tails are never too thin for a float.
-    scene.materials[0].reflection.lobe = brdf::parse("ggx:0.3").unwrap();
+    scene.materials[0].brdf.lobe = brdf::parse("ggx:0.3").unwrap();
     let method = ndf::parse("slopes").unwrap();
     let maps = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
     let mut undefined = [0, 0];
-    for turn in 0..12 {
-        let (sin, cos) = (TAU * f64::from(turn) / 12.0).sin_cos();
+    for rotation in 0..12 {
+        let (sin, cos) = (TAU * f64::from(rotation) / 12.0).sin_cos();
         let eye = DVec3::new(3.5 * sin, 0.4, 3.5 * cos);
         scene.camera = Camera::new(eye.to_array(), [0.0; 3], 35.0);
         scene.lights = vec![Light::Directional { towards: eye.normalize(), irradiance: DVec3::ONE }];
@@ -350,7 +355,7 @@ fn brightness_follows_the_truth_as_relief_becomes_roughness() {
     // From 40 pixels to ten: no step may be brighter or darker than the truth by more than 3 %.
     let size = Size { width: 48, height: 48 };
     for time in [0.0, 0.2, 0.4] {
-        let staging = Staging { time, map_size: Size { width: 256, height: 256 }, map: None };
+        let staging = SceneOptions { time, map_size: Size { width: 256, height: 256 }, map: None };
         let mut scene = (scene::find("noise-sphere").unwrap().build)(&staging);
         scene.displace(1.0, false).unwrap();
         let method = ndf::parse("slopes").unwrap();
@@ -359,9 +364,10 @@ fn brightness_follows_the_truth_as_relief_becomes_roughness() {
         let filtered = Filtered { scene: &scene, geometry: &geometry, maps: &maps, progress: &|_| () };
         let lookups = Lookups { filtering: Filtering::fine(16), ..Lookups::TRILINEAR };
         let seen = filtered.render(&scene.camera, size, lookups);
-        let (plain, relief) = (Geometry::without_relief(&scene), Relief::new(&scene));
+        let (plain, displacement) = (Geometry::without_displacement(&scene), DisplacedMeshes::new(&scene));
         let effort = Effort { rays: 64, noise: 0.0, seed: 1 };
-        let truth = Truth::displaced(&scene, &plain, &relief).render(&scene.camera, size, &effort, &|_| ());
+        let truth =
+            Truth::displaced(&scene, &plain, &displacement).render(&scene.camera, size, &effort, &|_| ());
         let light = |picture: &Picture| picture.texels().iter().map(|c| f64::from(c.x)).sum::<f64>();
         let ratio = light(&seen) / light(&truth.picture);
         println!("time {time}: {ratio:.4}");

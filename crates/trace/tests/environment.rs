@@ -10,11 +10,11 @@ use std::sync::Arc;
 use common::{SQUARE, filtered, map, plate, truth};
 use glam::{DVec3, Vec3};
 use ndfmap_core::brdf;
+use ndfmap_core::brdf::{Directions, ShadingModel};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
-use ndfmap_core::light::environment::{Environment, Surroundings, Technique, builtin};
+use ndfmap_core::light::environment::{Environment, SceneEnvironment, Technique, builtin};
 use ndfmap_core::metrics::{Picture, relative_l2};
-use ndfmap_core::reflection::{Model, Way};
 use ndfmap_core::scene::Scene;
 use ndfmap_core::surface::{NormalGrid, Surface, SurfaceRow, Wraps};
 use ndfmap_trace::filtered::Lookups;
@@ -26,7 +26,7 @@ fn flat() -> Arc<dyn Surface> {
 /// The scene in an environment, and no other light.
 fn inside(mut scene: Scene, environment: Environment, technique: Technique) -> Scene {
     scene.lights.clear();
-    scene.surroundings = Some(Surroundings { technique, ..Surroundings::new(environment) });
+    scene.environment = Some(SceneEnvironment { technique, ..SceneEnvironment::new(environment) });
     scene
 }
 
@@ -34,7 +34,7 @@ fn inside(mut scene: Scene, environment: Environment, technique: Technique) -> S
 /// are narrow, and one over directions for the diffuse part.
 fn integral(scene: &Scene, n: DVec3, sky: &dyn Fn(DVec3) -> DVec3) -> DVec3 {
     let material = &scene.materials[0];
-    let reflection = &material.reflection;
+    let brdf = &material.brdf;
     let lattice = |count: usize, f: &dyn Fn(f64, f64) -> DVec3| {
         let mut sum = DVec3::ZERO;
         for i in 0..count {
@@ -50,7 +50,7 @@ fn integral(scene: &Scene, n: DVec3, sky: &dyn Fn(DVec3) -> DVec3) -> DVec3 {
         x * (r * phi.cos()) + y * (r * phi.sin()) + n * z
     };
     // Half-vectors at tan² = a t/(1 - t): the quantiles of a GGX lobe, dense where the lobe is.
-    let a = 2.0 * reflection.width(material.finish.gloss).get();
+    let a = 2.0 * brdf.width(material.params.roughness).get();
     let specular = lattice(400, &|s, t| {
         let tan2 = a * s / (1.0 - s);
         let z = 1.0 / (1.0 + tan2).sqrt();
@@ -59,20 +59,21 @@ fn integral(scene: &Scene, n: DVec3, sky: &dyn Fn(DVec3) -> DVec3) -> DVec3 {
         if u <= 0.0 {
             return DVec3::ZERO;
         }
-        let Some(way) = Way::between(2.0 * u * wh - DVec3::Z, DVec3::Z) else { return DVec3::ZERO };
+        let Some(directions) = Directions::between(2.0 * u * wh - DVec3::Z, DVec3::Z) else {
+            return DVec3::ZERO;
+        };
         let density = a / (PI * z.powi(4) * (a + tan2).powi(2)) * z;
-        let plain = ndfmap_core::reflection::Finish { diffuse: DVec3::ZERO, ..material.finish };
-        sky(way.wi) * reflection.facet(n, &plain, &way) * (4.0 * u / density)
+        let plain = ndfmap_core::brdf::SurfaceParams { diffuse: DVec3::ZERO, ..material.params };
+        sky(directions.wi) * brdf.facet(n, &plain, &directions) * (4.0 * u / density)
     });
     let diffuse = lattice(400, &|s, t| {
         let wi = around(s, TAU * t);
-        let Some(way) = Way::between(wi, DVec3::Z) else { return DVec3::ZERO };
-        let fresnel = reflection.model.fresnel(material.finish.specular, way.u);
-        let share =
-            if reflection.is_specular() { reflection.model.diffuse_share(fresnel) } else { DVec3::ONE };
-        sky(wi) * share * material.finish.diffuse * (2.0 * s)
+        let Some(directions) = Directions::between(wi, DVec3::Z) else { return DVec3::ZERO };
+        let fresnel = brdf.shading.fresnel(material.params.specular, directions.u);
+        let share = if brdf.is_specular() { brdf.shading.diffuse_share(fresnel) } else { DVec3::ONE };
+        sky(wi) * share * material.params.diffuse * (2.0 * s)
     });
-    if reflection.is_specular() { specular + diffuse } else { diffuse }
+    if brdf.is_specular() { specular + diffuse } else { diffuse }
 }
 
 fn mean(picture: &Picture) -> DVec3 {
@@ -82,26 +83,27 @@ fn mean(picture: &Picture) -> DVec3 {
 #[test]
 fn every_lobe_is_right_in_a_furnace() {
     for spelling in brdf::TABLE.iter().flat_map(|row| row.samples) {
-        for model in [Model::Han, Model::Smith, Model::Masked, Model::Shadowed] {
-            if brdf::parse(spelling).unwrap().measured().is_some() && model != Model::Han {
+        for shading in [ShadingModel::Han, ShadingModel::Smith, ShadingModel::Masked, ShadingModel::Shadowed]
+        {
+            if brdf::parse(spelling).unwrap().measured().is_some() && shading != ShadingModel::Han {
                 // What was measured has its own masking in it.
                 continue;
             }
             let white = builtin::find("white").unwrap().build();
-            let mut scene = inside(plate(flat(), "lambert", model, 1e6), white, Technique::Prefiltered);
+            let mut scene = inside(plate(flat(), "lambert", shading, 1e6), white, Technique::Prefiltered);
             scene.set_brdf(&*brdf::parse(spelling).unwrap());
-            scene.set_model(model);
+            scene.set_shading(shading);
             let expected = integral(&scene, DVec3::Z, &|_| DVec3::ONE);
             let true_picture = truth(&scene, SQUARE, 512, 3);
             let apart = (mean(&true_picture.picture) - expected).length() / expected.length();
             // Sixteen pixels: a quarter of a pixel's noise, thrice; and what single floats leave.
             assert!(
                 apart < 0.75 * true_picture.noise + 1e-4,
-                "truth of {spelling} {model:?}: {apart}, noise {}",
+                "truth of {spelling} {shading:?}: {apart}, noise {}",
                 true_picture.noise
             );
             for technique in Technique::ALL {
-                scene.surroundings.as_mut().unwrap().technique = technique;
+                scene.environment.as_mut().unwrap().technique = technique;
                 for method in ["fixed", "toksvig", "vmf:2", "gmm:2", "sh:7", "slopes:32"] {
                     let got = mean(&filtered(&scene, method, SQUARE, Lookups::TRILINEAR));
                     let apart = (got - expected).length() / expected.length();
@@ -115,7 +117,7 @@ fn every_lobe_is_right_in_a_furnace() {
                     };
                     assert!(
                         apart < bound,
-                        "{method} with {spelling} {model:?} {}: {apart}",
+                        "{method} with {spelling} {shading:?} {}: {apart}",
                         technique.name()
                     );
                 }
@@ -135,11 +137,14 @@ fn one_direction_is_a_directional_light() {
     picture.row_mut(y)[x] = (irradiance / blank.solid_angle(y)).as_vec3();
     let one = Environment::new(picture).unwrap();
     let towards = one.direction(x as f64 + 0.5, y as f64 + 0.5);
-    for (lobe, model) in [("ggx:0.3", Model::Smith), ("blinn-phong:30", Model::Han), ("lambert", Model::Han)]
-    {
-        let mut lit = plate(map("foil", 32), lobe, model, 4.0);
+    for (lobe, shading) in [
+        ("ggx:0.3", ShadingModel::Smith),
+        ("blinn-phong:30", ShadingModel::Han),
+        ("lambert", ShadingModel::Han),
+    ] {
+        let mut lit = plate(map("foil", 32), lobe, shading, 4.0);
         lit.lights = vec![Light::Directional { towards, irradiance }];
-        let sky = inside(plate(map("foil", 32), lobe, model, 4.0), one.clone(), Technique::Prefiltered);
+        let sky = inside(plate(map("foil", 32), lobe, shading, 4.0), one.clone(), Technique::Prefiltered);
         for method in ["vmf:4", "slopes", "toksvig"] {
             let by = |scene| filtered(scene, method, Size { width: 24, height: 24 }, Lookups::TRILINEAR);
             // All but 50 times the mean, 50/131072 of it, shines as a light; a light sees facets from above the base surface only.
@@ -164,10 +169,13 @@ fn truth_is_the_integral() {
     // One pixel that sees a whole map, under a sky with lamps: the mean over texels of the integral over the sky.
     let surface = map("foil", 8);
     let studio = builtin::find("studio").unwrap().build();
-    for (lobe, model) in [("ggx:0.25", Model::Smith), ("blinn-phong:40", Model::Han), ("lambert", Model::Han)]
-    {
+    for (lobe, shading) in [
+        ("ggx:0.25", ShadingModel::Smith),
+        ("blinn-phong:40", ShadingModel::Han),
+        ("lambert", ShadingModel::Han),
+    ] {
         let scene =
-            inside(plate(Arc::clone(&surface), lobe, model, 1e6), studio.clone(), Technique::Prefiltered);
+            inside(plate(Arc::clone(&surface), lobe, shading, 1e6), studio.clone(), Technique::Prefiltered);
         let (mut row, mut expected) = (SurfaceRow::flat(8), DVec3::ZERO);
         for y in 0..8 {
             surface.read_row(y, &mut row);
@@ -192,7 +200,7 @@ fn nothing_rings_black_or_burns_out_beside_a_sun() {
     // A sun 100 000 times the mean: every pixel of a lit plate has light, by either technique, as the truth has.
     for technique in Technique::ALL {
         let sky = builtin::find("sky").unwrap().build();
-        let scene = inside(plate(map("foil", 32), "ggx:0.3", Model::Smith, 4.0), sky, technique);
+        let scene = inside(plate(map("foil", 32), "ggx:0.3", ShadingModel::Smith, 4.0), sky, technique);
         for method in ["fixed", "vmf:4", "sh:7", "slopes", "gmm:4"] {
             let picture = filtered(&scene, method, Size { width: 32, height: 32 }, Lookups::TRILINEAR);
             for pixel in picture.texels() {

@@ -9,13 +9,13 @@ use std::sync::Arc;
 
 use common::{SQUARE, filtered, map, plate, truth};
 use glam::{DVec3, Vec3};
+use ndfmap_core::brdf::{Directions, ShadingModel};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
 use ndfmap_core::lookup::Filtering;
 use ndfmap_core::metrics::{Picture, relative_l2};
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::reflection::{Model, Way};
-use ndfmap_core::scene::{self, Camera, FinishMap, Mesh, Scene, Staging};
+use ndfmap_core::scene::{self, Camera, Mesh, Scene, SceneOptions, SurfaceTextures};
 use ndfmap_core::surface::{NormalGrid, Surface, SurfaceRow, Wraps};
 use ndfmap_core::{ndf, procedural};
 use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
@@ -23,7 +23,7 @@ use ndfmap_trace::truth::{Effort, Truth};
 use ndfmap_trace::{DRIFT_FRAMES, Geometry, drifted};
 
 /// Mean over all texels of what they reflect, for one way: what a whole map far away looks like.
-fn mean_over_map(scene: &Scene, way: &Way) -> DVec3 {
+fn mean_over_map(scene: &Scene, directions: &Directions) -> DVec3 {
     let material = &scene.materials[0];
     let size = material.surface.size();
     let mut row = SurfaceRow::flat(size.width);
@@ -31,14 +31,14 @@ fn mean_over_map(scene: &Scene, way: &Way) -> DVec3 {
     for y in 0..size.height {
         material.surface.read_row(y, &mut row);
         for x in 0..size.width {
-            sum += material.reflection.facet(row.normal(x).as_dvec3(), &material.finish, way);
+            sum += material.brdf.facet(row.normal(x).as_dvec3(), &material.params, directions);
         }
     }
     sum / size.area() as f64
 }
 
-fn straight_down(scene: &Scene) -> Way {
-    Way::new(scene.lights[0].seen_from(DVec3::ZERO).0, DVec3::Z).unwrap()
+fn straight_down(scene: &Scene) -> Directions {
+    Directions::new(scene.lights[0].seen_from(DVec3::ZERO).0, DVec3::Z).unwrap()
 }
 
 #[test]
@@ -46,16 +46,16 @@ fn a_flat_map_is_the_analytic_brdf() {
     // From 1e6 away all pixels see the plate straight on, to 1e-6.
     let flat: Arc<dyn Surface> =
         Arc::new(NormalGrid { normals: Grid::from_fn(SQUARE, |_, _| Vec3::Z), wraps: Wraps::default() });
-    for (lobe, model) in [
-        ("blinn-phong:30", Model::Han),
-        ("torrance-sparrow:0.2", Model::Tan),
-        ("ggx:0.3", Model::Smith),
-        ("beckmann:0.3", Model::Smith),
-        ("lambert", Model::Han),
+    for (lobe, shading) in [
+        ("blinn-phong:30", ShadingModel::Han),
+        ("torrance-sparrow:0.2", ShadingModel::Tan),
+        ("ggx:0.3", ShadingModel::Smith),
+        ("beckmann:0.3", ShadingModel::Smith),
+        ("lambert", ShadingModel::Han),
     ] {
-        let scene = plate(Arc::clone(&flat), lobe, model, 1e6);
+        let scene = plate(Arc::clone(&flat), lobe, shading, 1e6);
         let expected =
-            scene.materials[0].reflection.facet(DVec3::Z, &scene.materials[0].finish, &straight_down(&scene));
+            scene.materials[0].brdf.facet(DVec3::Z, &scene.materials[0].params, &straight_down(&scene));
         let check = |picture: &Picture, what: &str| {
             for pixel in picture.texels() {
                 // Pictures are single floats.
@@ -86,8 +86,8 @@ fn a_white_furnace_is_as_white_as_the_grooves_see_sky() {
     let flat: Arc<dyn Surface> =
         Arc::new(NormalGrid { normals: Grid::from_fn(SQUARE, |_, _| Vec3::Z), wraps: Wraps::default() });
     for (surface, expected) in [(map("v-groove", 16), tilted), (flat, 1.0)] {
-        let mut scene = plate(surface, "lambert", Model::Han, 1e6);
-        scene.materials[0].finish.diffuse = DVec3::ONE;
+        let mut scene = plate(surface, "lambert", ShadingModel::Han, 1e6);
+        scene.materials[0].params.diffuse = DVec3::ONE;
         scene.lights = sky.iter().map(|d| Light::Directional { towards: *d, irradiance }).collect();
         // 2000 directions on an even lattice integrate a cosine to about 1/2000.
         let brute = truth(&scene, Size { width: 1, height: 1 }, 1, 0).picture.texels()[0];
@@ -103,18 +103,21 @@ fn a_white_furnace_is_as_white_as_the_grooves_see_sky() {
 
 #[test]
 fn a_v_groove_far_away_is_the_mean_of_its_flanks() {
-    for model in Model::ALL {
-        let scene = plate(map("v-groove", 64), "blinn-phong:60", model, 1e6);
-        let way = straight_down(&scene);
+    for shading in ShadingModel::ALL {
+        let scene = plate(map("v-groove", 64), "blinn-phong:60", shading, 1e6);
+        let directions = straight_down(&scene);
         let slope = f64::from(procedural::GROOVE_SLOPE);
         let [a, b] = [-slope, slope].map(|x| DVec3::new(x, 0.0, 1.0).normalize());
         let material = &scene.materials[0];
-        let facet = |n| material.reflection.facet(n, &material.finish, &way);
+        let facet = |n| material.brdf.facet(n, &material.params, &directions);
         let expected = (facet(a) + facet(b)) / 2.0;
         let one = Size { width: 1, height: 1 };
         // Chance puts 0.5/sqrt(32768) = 0.28 % too much on a flank; flanks differ by at most twice their mean; 4.5 deviations.
         let brute = truth(&scene, one, 1 << 15, 0).picture.texels()[0].as_dvec3();
-        assert!((brute - expected).length() < 0.025 * expected.length(), "{model:?}: {brute} for {expected}");
+        assert!(
+            (brute - expected).length() < 0.025 * expected.length(),
+            "{shading:?}: {brute} for {expected}"
+        );
         for method in ["vmf:2", "phong:2"] {
             let seen = filtered(&scene, method, one, Lookups::TRILINEAR).texels()[0].as_dvec3();
             // Lobes keep the least spread that storage tells, and peaks are fitted.
@@ -126,12 +129,12 @@ fn a_v_groove_far_away_is_the_mean_of_its_flanks() {
 #[test]
 fn a_plane_far_away_is_the_mean_over_the_map() {
     // Forty independent truths: their mean lies within 4.5 standard errors of the exact mean in all but one of 10⁵ tries.
-    for (name, lobe, model) in [
-        ("foil", "blinn-phong:50", Model::Han),
-        ("armour", "ggx:0.2", Model::Smith),
-        ("noise", "torrance-sparrow:0.1", Model::Tan),
+    for (name, lobe, shading) in [
+        ("foil", "blinn-phong:50", ShadingModel::Han),
+        ("armour", "ggx:0.2", ShadingModel::Smith),
+        ("noise", "torrance-sparrow:0.1", ShadingModel::Tan),
     ] {
-        let scene = plate(map(name, 64), lobe, model, 1e6);
+        let scene = plate(map(name, 64), lobe, shading, 1e6);
         let expected = mean_over_map(&scene, &straight_down(&scene)).x;
         let one = Size { width: 1, height: 1 };
         let tries: Vec<f64> =
@@ -149,7 +152,8 @@ fn a_plane_far_away_is_the_mean_over_the_map() {
 
 #[test]
 fn the_noise_told_is_the_noise_there_is() {
-    let scene = (scene::find("armour").unwrap().build)(&Staging { time: 0.5, ..Staging::default() });
+    let scene =
+        (scene::find("armour").unwrap().build)(&SceneOptions { time: 0.5, ..SceneOptions::default() });
     let size = Size { width: 48, height: 48 };
     let best = truth(&scene, size, 4096, 1).picture;
     for rays in [32, 128] {
@@ -166,7 +170,7 @@ fn the_noise_told_is_the_noise_there_is() {
 
 #[test]
 fn pictures_do_not_depend_on_the_number_of_threads() {
-    let scene = (scene::find("disk").unwrap().build)(&Staging {
+    let scene = (scene::find("disk").unwrap().build)(&SceneOptions {
         time: 0.3,
         map_size: Size { width: 64, height: 64 },
         map: None,
@@ -183,7 +187,7 @@ fn pictures_do_not_depend_on_the_number_of_threads() {
 
 #[test]
 fn a_drift_is_what_drifting_cameras_see() {
-    let scene = (scene::find("disk").unwrap().build)(&Staging {
+    let scene = (scene::find("disk").unwrap().build)(&SceneOptions {
         time: 0.2,
         map_size: Size { width: 64, height: 64 },
         map: None,
@@ -210,7 +214,7 @@ fn a_drift_is_what_drifting_cameras_see() {
 
 #[test]
 fn a_point_light_falls_off_with_the_square() {
-    let mut scene = plate(map("v-groove", 8), "lambert", Model::Han, 1e6);
+    let mut scene = plate(map("v-groove", 8), "lambert", ShadingModel::Han, 1e6);
     let mut seen = |height: f64| {
         scene.lights = vec![Light::Point { at: DVec3::new(0.0, 0.0, height), intensity: DVec3::splat(1e8) }];
         f64::from(truth(&scene, Size { width: 1, height: 1 }, 1, 0).picture.texels()[0].x)
@@ -228,10 +232,10 @@ fn lobes_carry_their_colours() {
     surface.read_row(0, &mut row);
     let colours =
         Grid::from_fn(size, |x, _| if row.x[x] > 0.0 { [0.8, 0.0, 0.0, 0.0] } else { [0.0, 0.0, 0.8, 0.0] });
-    let mut scene = plate(surface, "blinn-phong:60", Model::Han, 1e6);
-    scene.materials[0].finish.specular = DVec3::ZERO;
+    let mut scene = plate(surface, "blinn-phong:60", ShadingModel::Han, 1e6);
+    scene.materials[0].params.specular = DVec3::ZERO;
     scene.lights = vec![Light::Directional { towards: DVec3::new(0.8, 0.0, 0.6), irradiance: DVec3::ONE }];
-    scene.materials[0].finish_map = Some(FinishMap { diffuse_gloss: colours.into(), specular: None });
+    scene.materials[0].textures = Some(SurfaceTextures { diffuse_roughness: colours.into(), specular: None });
     let n = DVec3::new(0.5, 0.0, 1.0).normalize();
     let towards = DVec3::new(0.8, 0.0, 0.6);
     // The other flank has n·l = (-0.8 · 0.5 + 0.6)/sqrt 1.25 too, a fifth of this one's.
@@ -253,7 +257,7 @@ fn every_method_shows_every_scene() {
     let size = Size { width: 20, height: 16 };
     let lookups = Lookups { filtering: Filtering::fine(4), ..Lookups::TRILINEAR };
     for row in scene::TABLE {
-        let staging = Staging { time: 0.4, map_size: Size { width: 16, height: 16 }, map: None };
+        let staging = SceneOptions { time: 0.4, map_size: Size { width: 16, height: 16 }, map: None };
         let scene = (row.build)(&staging);
         let geometry = Geometry::new(&scene);
         for method in ndf::TABLE {
@@ -270,7 +274,7 @@ fn every_method_shows_every_scene() {
 
 #[test]
 fn finer_filters_are_nearer_to_the_truth() {
-    let staging = Staging { time: 0.0, map_size: Size { width: 512, height: 512 }, map: None };
+    let staging = SceneOptions { time: 0.0, map_size: Size { width: 512, height: 512 }, map: None };
     let scene = (scene::find("disk-oblique").unwrap().build)(&staging);
     let size = Size { width: 96, height: 96 };
     let best = truth(&scene, size, 1024, 0).picture;
@@ -285,7 +289,7 @@ fn finer_filters_are_nearer_to_the_truth() {
 #[test]
 fn scenes_far_from_everything_have_no_holes() {
     // A fine mesh a million away from the origin, seen from a million away from it.
-    let mut scene = (scene::find("sphere").unwrap().build)(&Staging::default());
+    let mut scene = (scene::find("sphere").unwrap().build)(&SceneOptions::default());
     let away = Vec3::new(1e6, -2e6, 5e5);
     let mut mesh = Mesh::clone(&scene.objects[0].mesh);
     mesh.vertices.iter_mut().for_each(|v| v.position = v.position * 1e4 + away);
@@ -304,7 +308,7 @@ fn scenes_far_from_everything_have_no_holes() {
 #[test]
 fn a_surface_shows_its_back() {
     // A diffuse plate between light and eye is lit on the side that the eye does not see, and one seen from behind is lit there.
-    let mut scene = plate(map("v-groove", 16), "lambert", Model::Han, 1e6);
+    let mut scene = plate(map("v-groove", 16), "lambert", ShadingModel::Han, 1e6);
     let one = Size { width: 1, height: 1 };
     let front = truth(&scene, one, 1, 0).picture.texels()[0];
     scene.camera = Camera::new([0.0, 0.0, -1e6], [0.0; 3], scene.camera.degrees);

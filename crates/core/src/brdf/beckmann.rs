@@ -7,7 +7,7 @@
 use std::borrow::Cow;
 use std::f64::consts::PI;
 
-use super::{Argument, Brdf, Row, number, untinted};
+use super::{Argument, Lobe, Microfacets, Row, number, twin};
 use crate::units::{Alpha, SlopeVariance};
 
 /// A Beckmann distribution of microfacets.
@@ -50,7 +50,7 @@ pub(super) fn masking(u: f64, width: SlopeVariance) -> f64 {
     if a < 1.6 { (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a) } else { 1.0 }
 }
 
-impl Brdf for Beckmann {
+impl Lobe for Beckmann {
     fn spelling(&self) -> String {
         format!("{}:{}", ROW.name, self.alpha_squared.sqrt())
     }
@@ -65,7 +65,7 @@ impl Brdf for Beckmann {
             return 0.0;
         }
         let u2 = (u * u).min(1.0);
-        (-(1.0 - u2) / (u2 * self.alpha_squared)).exp() / (PI * self.alpha_squared * u2 * u2)
+        Microfacets::Beckmann.d(self.alpha_squared, u2, 1.0 - u2)
     }
 
     fn evaluate_all(&self, u: &mut [f64]) {
@@ -81,11 +81,11 @@ impl Brdf for Beckmann {
         (-0.5 * square).exp() / (2.0 * PI)
     }
 
-    fn microfacets(&self) -> Option<Self> {
+    fn as_beckmann(&self) -> Option<Self> {
         None
     }
 
-    fn widen(&self, by: SlopeVariance) -> Box<dyn Brdf> {
+    fn widen(&self, by: SlopeVariance) -> Box<dyn Lobe> {
         Box::new(self.widened(by))
     }
 
@@ -94,7 +94,7 @@ impl Brdf for Beckmann {
     }
 
     fn shader(&self) -> Cow<'static, str> {
-        untinted(include_str!("beckmann.wgsl"))
+        [include_str!("beckmann.wgsl"), twin::GAUSSIAN_FACETS, twin::UNTINTED].join("\n").into()
     }
 
     fn base(&self) -> f64 {

@@ -4,12 +4,12 @@
 const SPECULAR: bool = true;
 
 // The lobe widened by a slope variance: alpha'² = alpha² + 2 v.
-fn brdf_widen(base: f32, by: f32) -> f32 {
+fn lobe_widen(base: f32, by: f32) -> f32 {
     return base + 2.0 * by;
 }
 
 // D(u), u the cosine between normal and half-vector.
-fn brdf_evaluate(base: f32, u: f32) -> f32 {
+fn lobe_evaluate(base: f32, u: f32) -> f32 {
     // Below, the exponential has underflowed for alpha up to 1, and u⁴ is about to for any.
     if u <= 1e-6 {
         return 0.0;
@@ -19,21 +19,11 @@ fn brdf_evaluate(base: f32, u: f32) -> f32 {
 }
 
 // Slope variance on one axis.
-fn brdf_variance(base: f32) -> f32 {
+fn lobe_variance(base: f32) -> f32 {
     return base / 2.0;
 }
 
-// Smith's masking at cosine `u > 0`, of a lobe of this kind that is `width` wide.
-fn brdf_masking(u: f32, width: f32) -> f32 {
-    return beckmann_masking(u, width);
-}
-
-// Projected area of the facets that face a direction.
-fn brdf_visible_area(mean: f32, deviation: f32) -> f32 {
-    return mean_of_positive_part(mean, deviation * deviation);
-}
-
 // Density of facets over slopes, at a slope of this squared length in units of the lobe's deviation: D u⁴ times its variance.
-fn brdf_slope_profile(base: f32, square: f32) -> f32 {
+fn lobe_slope_profile(base: f32, square: f32) -> f32 {
     return exp(-0.5 * square) / (2.0 * PI);
 }

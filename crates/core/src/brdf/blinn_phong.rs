@@ -6,7 +6,7 @@
 use std::borrow::Cow;
 use std::f64::consts::PI;
 
-use super::{Argument, Brdf, Row, number, untinted};
+use super::{Argument, Lobe, Row, number, twin};
 use crate::units::{Exponent, SlopeVariance};
 
 /// A normalised Blinn-Phong highlight.
@@ -32,7 +32,7 @@ impl BlinnPhong {
     }
 }
 
-impl Brdf for BlinnPhong {
+impl Lobe for BlinnPhong {
     fn spelling(&self) -> String {
         format!("{}:{}", ROW.name, self.exponent)
     }
@@ -62,7 +62,7 @@ impl Brdf for BlinnPhong {
         Some(self.exponent.into())
     }
 
-    fn widen(&self, by: SlopeVariance) -> Box<dyn Brdf> {
+    fn widen(&self, by: SlopeVariance) -> Box<dyn Lobe> {
         Box::new(self.widened(by))
     }
 
@@ -71,7 +71,9 @@ impl Brdf for BlinnPhong {
     }
 
     fn shader(&self) -> Cow<'static, str> {
-        untinted(include_str!("blinn_phong.wgsl"))
+        [include_str!("blinn_phong.wgsl"), twin::GAUSSIAN_FACETS, twin::SLOPE_PROFILE, twin::UNTINTED]
+            .join("\n")
+            .into()
     }
 
     fn base(&self) -> f64 {

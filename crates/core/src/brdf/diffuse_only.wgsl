@@ -3,27 +3,27 @@
 // False: the lobe is of the light's direction, and the diffuse part already.
 const SPECULAR: bool = false;
 
-fn brdf_widen(base: f32, by: f32) -> f32 {
+fn lobe_widen(base: f32, by: f32) -> f32 {
     return base;
 }
 
-fn brdf_evaluate(base: f32, u: f32) -> f32 {
+fn lobe_evaluate(base: f32, u: f32) -> f32 {
     return 0.0;
 }
 
-fn brdf_variance(base: f32) -> f32 {
+fn lobe_variance(base: f32) -> f32 {
     return 0.0;
 }
 
-fn brdf_masking(u: f32, width: f32) -> f32 {
+fn lobe_masking(u: f32, width: f32) -> f32 {
     return 1.0;
 }
 
 // Diffuse facets are not without relief: Beckmann's.
-fn brdf_visible_area(mean: f32, deviation: f32) -> f32 {
+fn lobe_visible_area(mean: f32, deviation: f32) -> f32 {
     return mean_of_positive_part(mean, deviation * deviation);
 }
 
-fn brdf_slope_profile(base: f32, square: f32) -> f32 {
+fn lobe_slope_profile(base: f32, square: f32) -> f32 {
     return 0.0;
 }

@@ -7,8 +7,7 @@
 use std::borrow::Cow;
 use std::f64::consts::PI;
 
-use super::{Argument, Brdf, Row, number, untinted};
-use crate::light::environment::Kernel;
+use super::{Argument, Lobe, Microfacets, Row, number, twin};
 use crate::units::{Alpha, SlopeVariance};
 
 /// A GGX distribution of microfacets.
@@ -37,7 +36,7 @@ pub(super) const ROW: Row = Row {
     samples: &["ggx:0.1", "ggx:0.4"],
 };
 
-impl Brdf for Ggx {
+impl Lobe for Ggx {
     fn spelling(&self) -> String {
         format!("{}:{}", ROW.name, self.alpha_squared.sqrt())
     }
@@ -50,10 +49,8 @@ impl Brdf for Ggx {
         if u <= 0.0 {
             return 0.0;
         }
-        // 1 - u² + alpha² u²: the printed (alpha²-1) u² + 1 without its cancellation.
         let u2 = (u * u).min(1.0);
-        let d = (1.0 - u2) + self.alpha_squared * u2;
-        self.alpha_squared / (PI * d * d)
+        Microfacets::Ggx.d(self.alpha_squared, u2, 1.0 - u2)
     }
 
     fn evaluate_all(&self, u: &mut [f64]) {
@@ -83,15 +80,15 @@ impl Brdf for Ggx {
         if mean < 0.0 { spread / (root - mean) / 2.0 } else { (mean + root) / 2.0 }
     }
 
-    fn kernel(&self) -> Kernel {
-        Kernel::Ggx
+    fn microfacets(&self) -> Microfacets {
+        Microfacets::Ggx
     }
 
-    fn microfacets(&self) -> Option<super::Beckmann> {
+    fn as_beckmann(&self) -> Option<super::Beckmann> {
         None
     }
 
-    fn widen(&self, by: SlopeVariance) -> Box<dyn Brdf> {
+    fn widen(&self, by: SlopeVariance) -> Box<dyn Lobe> {
         Box::new(self.widened(by))
     }
 
@@ -100,7 +97,7 @@ impl Brdf for Ggx {
     }
 
     fn shader(&self) -> Cow<'static, str> {
-        untinted(include_str!("ggx.wgsl"))
+        [include_str!("ggx.wgsl"), twin::UNTINTED].join("\n").into()
     }
 
     fn base(&self) -> f64 {

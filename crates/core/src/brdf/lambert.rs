@@ -7,7 +7,7 @@
 use std::borrow::Cow;
 use std::f64::consts::{PI, SQRT_2};
 
-use super::{Argument, Brdf, Row, untinted};
+use super::{Argument, Lobe, Row, twin};
 use crate::units::SlopeVariance;
 
 /// A diffuse surface, perhaps already widened by a lobe of normals.
@@ -47,7 +47,7 @@ pub fn mean_of_positive_part(mean: f64, variance: f64) -> f64 {
     mean * 0.5 * libm::erfc(-t / SQRT_2) + s * density
 }
 
-impl Brdf for Lambert {
+impl Lobe for Lambert {
     fn spelling(&self) -> String {
         ROW.name.to_owned()
     }
@@ -76,7 +76,7 @@ impl Brdf for Lambert {
         None
     }
 
-    fn widen(&self, by: SlopeVariance) -> Box<dyn Brdf> {
+    fn widen(&self, by: SlopeVariance) -> Box<dyn Lobe> {
         Box::new(self.widened(by))
     }
 
@@ -85,7 +85,7 @@ impl Brdf for Lambert {
     }
 
     fn shader(&self) -> Cow<'static, str> {
-        untinted(include_str!("diffuse_only.wgsl"))
+        [include_str!("diffuse_only.wgsl"), twin::UNTINTED].join("\n").into()
     }
 
     fn base(&self) -> f64 {

@@ -7,7 +7,7 @@
 use std::borrow::Cow;
 use std::f64::consts::PI;
 
-use super::{Argument, Brdf, Row, number, untinted};
+use super::{Argument, Lobe, Row, number, twin};
 use crate::units::{LobeAngle, SlopeVariance};
 
 /// A Gaussian of the angle to the half-vector.
@@ -36,7 +36,7 @@ pub(super) const ROW: Row = Row {
     samples: &["torrance-sparrow:0.05", "torrance-sparrow:0.2"],
 };
 
-impl Brdf for TorranceSparrow {
+impl Lobe for TorranceSparrow {
     fn spelling(&self) -> String {
         format!("{}:{}", ROW.name, self.sigma_squared.sqrt())
     }
@@ -61,7 +61,7 @@ impl Brdf for TorranceSparrow {
         Some(SlopeVariance::clamped(2.0 * self.sigma_squared))
     }
 
-    fn widen(&self, by: SlopeVariance) -> Box<dyn Brdf> {
+    fn widen(&self, by: SlopeVariance) -> Box<dyn Lobe> {
         Box::new(self.widened(by))
     }
 
@@ -70,7 +70,9 @@ impl Brdf for TorranceSparrow {
     }
 
     fn shader(&self) -> Cow<'static, str> {
-        untinted(include_str!("torrance_sparrow.wgsl"))
+        [include_str!("torrance_sparrow.wgsl"), twin::GAUSSIAN_FACETS, twin::SLOPE_PROFILE, twin::UNTINTED]
+            .join("\n")
+            .into()
     }
 
     fn base(&self) -> f64 {

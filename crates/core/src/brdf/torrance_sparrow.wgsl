@@ -5,7 +5,7 @@
 const SPECULAR: bool = true;
 
 // The lobe widened by a slope variance: sigma'² = sigma² + v/2.
-fn brdf_widen(base: f32, by: f32) -> f32 {
+fn lobe_widen(base: f32, by: f32) -> f32 {
     return base + by / 2.0;
 }
 
@@ -22,7 +22,7 @@ fn squared_angle(u: f32) -> f32 {
 }
 
 // f(u), u the cosine between normal and half-vector.
-fn brdf_evaluate(base: f32, u: f32) -> f32 {
+fn lobe_evaluate(base: f32, u: f32) -> f32 {
     if u <= 0.0 {
         return 0.0;
     }
@@ -30,22 +30,6 @@ fn brdf_evaluate(base: f32, u: f32) -> f32 {
 }
 
 // Slope variance on one axis.
-fn brdf_variance(base: f32) -> f32 {
+fn lobe_variance(base: f32) -> f32 {
     return 2.0 * base;
-}
-
-// Smith's masking at cosine `u > 0`, of a lobe of this kind that is `width` wide.
-fn brdf_masking(u: f32, width: f32) -> f32 {
-    return beckmann_masking(u, width);
-}
-
-// Projected area of the facets that face a direction; Beckmann's.
-fn brdf_visible_area(mean: f32, deviation: f32) -> f32 {
-    return mean_of_positive_part(mean, deviation * deviation);
-}
-
-// Density of facets over slopes, at a slope of this squared length in units of the lobe's deviation: D u⁴ times its variance.
-fn brdf_slope_profile(base: f32, square: f32) -> f32 {
-    let u2 = 1.0 / (1.0 + brdf_variance(base) * square);
-    return brdf_evaluate(base, sqrt(u2)) * u2 * u2 * brdf_variance(base);
 }

@@ -314,7 +314,7 @@ impl<'a, F: Family> Fitter<'a, F> {
         let mut made = self.empty(level);
         let size = made.size;
         let grid = self.samplings.for_level(size);
-        // One lobe has nothing to be aligned with, and its sums are exact means: refinement would only bend it to one gloss.
+        // One lobe has nothing to be aligned with, and its sums are exact means: refinement would only bend it to one roughness.
         let refined = self.fit.alignment == Alignment::Refined && lobes > 1;
         let rounds = match parent {
             None => 0,
@@ -344,7 +344,7 @@ impl<'a, F: Family> Fitter<'a, F> {
             let rounds = if well { REFINE_ROUNDS_PER_LOBE * lobes } else { FINE_REFINE_ROUNDS };
             refine(family, grid, &mut LevelLobes { size, lobes, sums: &mut made.sums }, rounds);
         }
-        made.sums.par_chunks_mut(lobes).for_each(bury);
+        made.sums.par_chunks_mut(lobes).for_each(remove_light_lobes);
         made
     }
 
@@ -495,7 +495,7 @@ fn at(size: Size, i: usize) -> (usize, usize) {
 }
 
 /// Removes lobes too light to store; the others take over their weight.
-fn bury(sums: &mut [Four]) {
+fn remove_light_lobes(sums: &mut [Four]) {
     let light = |s: &Four| s[0] < LEAST_WEIGHT;
     let kept: f32 = sums.iter().filter(|s| !light(s)).map(|s| s[0]).sum();
     for sums in sums.iter_mut() {

@@ -1,8 +1,8 @@
 //! Peaks: a few Phong lobes by non-linear least squares. Fournier 1992, "Normal Distribution Functions and Multiple Surfaces",
 //! as Tan et al. 2005 and Han et al. 2007 compare with it.
 //!
-//! What is fitted is the texel's effective lobe under Blinn-Phong of exponent [`GLOSS`], a sharp enough look at its
-//! normals that is still smooth: the sum of peaks, each `weight (s'+1)/(2 pi) (w·d)^{s'}`, `s' = s GLOSS/(s + GLOSS)`, against
+//! What is fitted is the texel's effective lobe under Blinn-Phong of exponent [`PROBE_EXPONENT`], a sharp enough look at its
+//! normals that is still smooth: the sum of peaks, each `weight (s'+1)/(2 pi) (w·d)^{s'}`, `s' = s PROBE_EXPONENT/(s + PROBE_EXPONENT)`, against
 //! the mean over the normals, at a grid of directions around them. It starts from EM's lobes, and weights are brought to sum
 //! to one at the end, so that energy is kept.
 
@@ -19,7 +19,7 @@ use super::{FitJob, FittedRows, PARENT_ROUNDS, at};
 use crate::pyramid::level_sizes;
 
 /// Exponent of the lobe through which normals are seen.
-const GLOSS: f64 = 100.0;
+const PROBE_EXPONENT: f64 = 100.0;
 
 /// The sharpest peak that a half float holds; it stands for no width at all.
 pub const SHARPEST: f32 = 6e4;
@@ -138,9 +138,9 @@ impl Peaks {
                 let n = [samples.a[*i], samples.b[*i], 1.0 - samples.c[*i]].map(f64::from);
                 let length = n.iter().map(|c| c * c).sum::<f64>().sqrt();
                 let u = (0..3).map(|k| w[k] * n[k]).sum::<f64>() / length;
-                f64::from(samples.weight[*i]) * u.max(0.0).powi(GLOSS as i32)
+                f64::from(samples.weight[*i]) * u.max(0.0).powi(PROBE_EXPONENT as i32)
             };
-            (GLOSS + 1.0) / std::f64::consts::TAU * alive.iter().map(seen).sum::<f64>()
+            (PROBE_EXPONENT + 1.0) / std::f64::consts::TAU * alive.iter().map(seen).sum::<f64>()
         });
         Self { truth: truth.collect(), directions, parameters: DVector::zeros(0) }
     }
@@ -162,7 +162,7 @@ impl Peaks {
         if u <= 1e-6 {
             return [0.0; 4];
         }
-        let share = GLOSS / (peak.exponent + GLOSS);
+        let share = PROBE_EXPONENT / (peak.exponent + PROBE_EXPONENT);
         let s = peak.exponent * share;
         let f = peak.weight * (s + 1.0) / std::f64::consts::TAU * u.powf(s);
         let by_u = f * s / u;
@@ -190,8 +190,8 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Peaks {
 
     fn residuals(&self) -> Option<DVector<f64>> {
         let peaks: Vec<Peak> = self.peaks().collect();
-        let model = |w: &[f64; 3]| peaks.iter().map(|p| Self::value(p, w)[0]).sum::<f64>();
-        let residuals = self.directions.iter().zip(&self.truth).map(|(w, truth)| model(w) - truth);
+        let shading = |w: &[f64; 3]| peaks.iter().map(|p| Self::value(p, w)[0]).sum::<f64>();
+        let residuals = self.directions.iter().zip(&self.truth).map(|(w, truth)| shading(w) - truth);
         Some(DVector::from_iterator(self.truth.len(), residuals))
     }
 

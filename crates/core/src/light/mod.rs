@@ -33,10 +33,10 @@ impl Light {
         match *self {
             Self::Directional { towards, irradiance } => (towards, irradiance),
             Self::Point { at, intensity } => {
-                let way = at - place;
+                let to_light = at - place;
                 // A light that touches a surface would be infinitely bright there.
-                let square = way.length_squared().max(1e-12);
-                (way / square.sqrt(), intensity / square)
+                let square = to_light.length_squared().max(1e-12);
+                (to_light / square.sqrt(), intensity / square)
             }
         }
     }

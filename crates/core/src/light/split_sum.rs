@@ -14,9 +14,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::brdf::Brdf;
-use crate::light::environment::{HALF_VECTOR_ORDER, Kernel};
-use crate::reflection::{Model, Reflection, Way};
+use crate::brdf::{Brdf, Directions, Lobe, Microfacets, ShadingModel};
+use crate::light::environment::HALF_VECTOR_ORDER;
 use crate::sphere::gauss_legendre;
 use crate::units::SlopeVariance;
 
@@ -73,7 +72,7 @@ pub struct SplitSum {
     /// Zonal coefficients of the lobe, to the order that half-vectors have.
     pub zonal: [f64; HALF_VECTOR_ORDER + 1],
     /// The cubes that its highlights look up.
-    pub kernel: Kernel,
+    pub microfacets: Microfacets,
     /// Facets of the lobe, per unit of map: the integral of its profile over slopes.
     pub facets: f64,
 }
@@ -81,18 +80,18 @@ pub struct SplitSum {
 impl SplitSum {
     /// Works the table out.
     #[must_use]
-    pub fn new(reflection: &Reflection) -> Self {
-        let coefficients = reflection.lobe.zonal(HALF_VECTOR_ORDER);
+    pub fn new(brdf: &Brdf) -> Self {
+        let coefficients = brdf.lobe.zonal(HALF_VECTOR_ORDER);
         let entry = |i: usize| {
             let spread = ((i / ENTRIES) as f64 / (ENTRIES - 1) as f64).powi(2);
             let cosine = ((i % ENTRIES) as f64 / (ENTRIES - 1) as f64).max(LEAST_COSINE);
-            reflected(reflection, cosine, SlopeVariance::clamped(spread))
+            reflected(brdf, cosine, SlopeVariance::clamped(spread))
         };
         Self {
             entries: (0..ENTRIES * ENTRIES).into_par_iter().map(entry).collect(),
             zonal: std::array::from_fn(|l| coefficients[l]),
-            kernel: reflection.lobe.kernel(),
-            facets: facets(&*reflection.lobe),
+            microfacets: brdf.lobe.microfacets(),
+            facets: facets(&*brdf.lobe),
         }
     }
 
@@ -126,7 +125,7 @@ impl SplitSum {
 }
 
 /// Integral of a lobe's profile over slopes, in its own deviations, to sixty-four of them.
-fn facets(lobe: &dyn Brdf) -> f64 {
+fn facets(lobe: &dyn Lobe) -> f64 {
     let (mut sum, mut from, mut to) = (0.0, 0.0, 1.0);
     while to <= 64.0 {
         for (node, weight) in gauss_legendre(16) {
@@ -142,13 +141,13 @@ fn facets(lobe: &dyn Brdf) -> f64 {
 const RINGS: usize = 32;
 const SPOKES: usize = 32;
 
-fn reflected(reflection: &Reflection, cosine: f64, spread: SlopeVariance) -> Reflected {
+fn reflected(brdf: &Brdf, cosine: f64, spread: SlopeVariance) -> Reflected {
     let wo = DVec3::new((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine);
     let mut sum = Reflected { rise: rise(wo), tilt: 1.0, blur: 1.0, ..Reflected::default() };
-    if !reflection.is_specular() {
+    if !brdf.is_specular() {
         return sum;
     }
-    let base = reflection.width(SlopeVariance::ZERO);
+    let base = brdf.width(SlopeVariance::ZERO);
     // Half-vectors as GGX facets have them: it has weight wherever a lobe of this width has some.
     let alpha_squared = 2.0 * base.widen(spread).get();
     let share = |ring: usize| (ring as f64 + 0.5) / RINGS as f64;
@@ -157,9 +156,9 @@ fn reflected(reflection: &Reflection, cosine: f64, spread: SlopeVariance) -> Ref
         // A warp of the shares to both ends, so that peak and tail have rings of their own: 3t² - 2t³, with its slope.
         let t = share(ring);
         let (warped, slope) = (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t));
-        let tan_squared = Kernel::Ggx.quantile(alpha_squared, warped);
+        let tan_squared = Microfacets::Ggx.quantile(alpha_squared, warped);
         let z = (1.0 + tan_squared).sqrt().recip();
-        let density = Kernel::Ggx.facets(alpha_squared, tan_squared) * z;
+        let density = Microfacets::Ggx.d_of_tangent(alpha_squared, tan_squared) * z;
         let solid_angle = slope / (density * (RINGS * SPOKES) as f64);
         let r = (1.0 - z * z).max(0.0).sqrt();
         // The same on both sides of the plane of incidence.
@@ -170,25 +169,26 @@ fn reflected(reflection: &Reflection, cosine: f64, spread: SlopeVariance) -> Ref
             if u <= 0.0 {
                 continue;
             }
-            let way = Way { wi: 2.0 * u * wh - wo, wo, wh, u };
+            let directions = Directions { wi: 2.0 * u * wh - wo, wo, wh, u };
             // Directions of the light are 4 u as many.
-            let lobe = reflection.lobe.evaluate_widened(spread, z) * 4.0 * u * solid_angle;
+            let lobe = brdf.lobe.evaluate_widened(spread, z) * 4.0 * u * solid_angle;
             let n = (DVec3::Z * base.get() + wh * spread.get()).try_normalize().unwrap_or(DVec3::Z);
-            let answered = lobe * reflection.factor(n, &way, SlopeVariance::ZERO);
-            let tint = reflection.lobe.tint(u);
-            let dark = reflection.model.fresnel(DVec3::ZERO, u).x;
+            let answered = lobe * brdf.factor(n, &directions, SlopeVariance::ZERO);
+            let tint = brdf.lobe.tint(u);
+            let dark = brdf.shading.fresnel(DVec3::ZERO, u).x;
             sum.lobe += lobe;
-            sum.scale += tint * (answered * (reflection.model.fresnel(DVec3::ONE, u).x - dark));
+            sum.scale += tint * (answered * (brdf.shading.fresnel(DVec3::ONE, u).x - dark));
             sum.bias += answered * dark;
-            towards += way.wi * answered;
+            towards += directions.wi * answered;
             all += answered;
         }
     }
     if all > 0.0 {
-        let kernel = reflection.lobe.kernel();
+        let microfacets = brdf.lobe.microfacets();
         let mean = towards / all;
         sum.tilt = if wo.x > 1e-6 { -mean.x / (mean.length() * wo.x) } else { 1.0 };
-        sum.blur = kernel.roughness_of(mean.length()) / Kernel::roughness(base.widen(spread)).max(1e-6);
+        sum.blur =
+            microfacets.roughness_of(mean.length()) / Microfacets::roughness(base.widen(spread)).max(1e-6);
     }
     sum
 }
@@ -212,9 +212,9 @@ fn rise(wo: DVec3) -> f64 {
 impl Reflected {
     /// What is left for the diffuse part of a material of this specular colour.
     #[must_use]
-    pub fn diffuse_share(&self, model: Model, specular: DVec3) -> DVec3 {
-        match model {
-            Model::Han => DVec3::ONE,
+    pub fn diffuse_share(&self, shading: ShadingModel, specular: DVec3) -> DVec3 {
+        match shading {
+            ShadingModel::Han => DVec3::ONE,
             _ => DVec3::ONE - specular - (DVec3::ONE - specular) * self.rise,
         }
     }
@@ -225,19 +225,19 @@ mod tests {
     use super::*;
     use crate::brdf;
 
-    fn table(lobe: &str, model: Model) -> SplitSum {
-        SplitSum::new(&Reflection { lobe: brdf::parse(lobe).unwrap(), model })
+    fn table(lobe: &str, shading: ShadingModel) -> SplitSum {
+        SplitSum::new(&Brdf { lobe: brdf::parse(lobe).unwrap(), shading })
     }
 
     #[test]
     fn a_smooth_mirror_reflects_all_and_a_rough_one_less() {
         // Without Fresnel (specular 1), microfacets that hide each other and nothing else send back what they see: 1, for masking alone,
         // but for light from below, which the normal's own hemisphere ends: none at alpha 0.05 seen straight on.
-        let masked = table("ggx:0.05", Model::Masked);
+        let masked = table("ggx:0.05", ShadingModel::Masked);
         let straight = masked.lookup(1.0, SlopeVariance::ZERO);
         assert!((straight.scale.x + straight.bias - 1.0).abs() < 0.01, "{straight:?}");
         // Walter et al.'s single scattering of GGX at alpha 1, seen straight on: 0.45 (Heitz et al. 2016 show the loss, figure 3, as over half).
-        let rough = table("ggx:1", Model::Smith).lookup(1.0, SlopeVariance::ZERO);
+        let rough = table("ggx:1", ShadingModel::Smith).lookup(1.0, SlopeVariance::ZERO);
         assert!(rough.scale.x + rough.bias < 0.75, "{rough:?}");
         assert!(rough.scale.x + rough.bias > 0.3, "{rough:?}");
     }
@@ -245,32 +245,34 @@ mod tests {
     #[test]
     fn tables_are_the_integral() {
         // Against plain quadrature over the light's directions of what shading gives for them.
-        for (lobe, model) in [
-            ("blinn-phong:20", Model::Han),
-            ("beckmann:0.4", Model::Smith),
-            ("ggx:0.3", Model::Shadowed),
-            ("ggx:0.5", Model::Tan),
+        for (lobe, shading) in [
+            ("blinn-phong:20", ShadingModel::Han),
+            ("beckmann:0.4", ShadingModel::Smith),
+            ("ggx:0.3", ShadingModel::Shadowed),
+            ("ggx:0.5", ShadingModel::Tan),
         ] {
-            let reflection = Reflection { lobe: brdf::parse(lobe).unwrap(), model };
+            let brdf = Brdf { lobe: brdf::parse(lobe).unwrap(), shading };
             let spread = SlopeVariance::clamped((3.0_f64 / 15.0).powi(2));
             let cosine = 12.0 / 15.0;
-            let got = SplitSum::new(&reflection).lookup(cosine, spread);
+            let got = SplitSum::new(&brdf).lookup(cosine, spread);
             let wo = DVec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine);
-            let base = reflection.width(SlopeVariance::ZERO);
+            let base = brdf.width(SlopeVariance::ZERO);
             let (mut scale, mut bias, mut lobe_sum, mut towards) = (0.0, 0.0, 0.0, DVec3::ZERO);
             for (z, weight) in gauss_legendre(400) {
                 for k in 0..400 {
                     let (y, x) = (TAU * f64::from(k) / 400.0).sin_cos();
                     let r = (1.0 - z * z).sqrt();
-                    let Some(way) = Way::between(DVec3::new(r * x, r * y, z), wo) else { continue };
-                    let lobe = reflection.lobe.evaluate_widened(spread, way.wh.z) * weight * TAU / 400.0;
-                    let n = (DVec3::Z * base.get() + way.wh * spread.get()).normalize();
-                    let answered = lobe * reflection.factor(n, &way, SlopeVariance::ZERO);
-                    let dark = reflection.model.fresnel(DVec3::ZERO, way.u).x;
+                    let Some(directions) = Directions::between(DVec3::new(r * x, r * y, z), wo) else {
+                        continue;
+                    };
+                    let lobe = brdf.lobe.evaluate_widened(spread, directions.wh.z) * weight * TAU / 400.0;
+                    let n = (DVec3::Z * base.get() + directions.wh * spread.get()).normalize();
+                    let answered = lobe * brdf.factor(n, &directions, SlopeVariance::ZERO);
+                    let dark = brdf.shading.fresnel(DVec3::ZERO, directions.u).x;
                     lobe_sum += lobe;
-                    scale += answered * (reflection.model.fresnel(DVec3::ONE, way.u).x - dark);
+                    scale += answered * (brdf.shading.fresnel(DVec3::ONE, directions.u).x - dark);
                     bias += answered * dark;
-                    towards += answered * way.wi;
+                    towards += answered * directions.wi;
                 }
             }
             // Thirty-two rings of a smooth function, cut at the horizon of half-vectors.
@@ -281,16 +283,16 @@ mod tests {
             let mean = towards / (scale + bias);
             let angle = got.towards(DVec3::Z, wo).angle_between(mean).to_degrees();
             assert!(angle < 0.5, "{lobe}: {angle} degrees");
-            let width = Kernel::roughness(base.widen(spread));
-            let blur = reflection.lobe.kernel().roughness_of(mean.length()) / width;
+            let width = Microfacets::roughness(base.widen(spread));
+            let blur = brdf.lobe.microfacets().roughness_of(mean.length()) / width;
             assert!((got.blur / blur - 1.0).abs() < 0.01, "{lobe}: {} {blur}", got.blur);
         }
     }
 
     #[test]
     fn a_narrow_lobe_sees_the_mirror_direction_and_a_wide_one_seen_flatly_what_is_above() {
-        let narrow = table("beckmann:0.02", Model::Han);
-        let wide = table("beckmann:0.6", Model::Han);
+        let narrow = table("beckmann:0.02", ShadingModel::Han);
+        let wide = table("beckmann:0.6", ShadingModel::Han);
         for cosine in [0.2, 0.6, 1.0] {
             let straight = narrow.lookup(cosine, SlopeVariance::ZERO);
             // Mirrored, half-vectors are twice as wide, and across the plane of incidence as wide as the cosine, so that the mean of both

@@ -41,6 +41,6 @@ fn reflected_towards(reflected: Reflected, mu: vec3<f32>, wo: vec3<f32>) -> vec3
 }
 
 // What is left for the diffuse part of a material of this specular colour.
-fn reflected_diffuse_share(model: u32, rise: f32, specular: vec3<f32>) -> vec3<f32> {
-    return select(1.0 - specular - (1.0 - specular) * rise, vec3<f32>(1.0), model == HAN);
+fn reflected_diffuse_share(shading: u32, rise: f32, specular: vec3<f32>) -> vec3<f32> {
+    return select(1.0 - specular - (1.0 - specular) * rise, vec3<f32>(1.0), shading == HAN);
 }

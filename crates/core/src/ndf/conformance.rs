@@ -4,7 +4,7 @@ use glam::{DVec3, Vec2, Vec3};
 
 use super::{Decoded, FlatLobe, Method, TABLE, parse};
 use crate::bake::Bake;
-use crate::brdf::{self, Brdf};
+use crate::brdf::{self, Lobe};
 use crate::fit::Alignment;
 use crate::grid::{Grid, Size};
 use crate::procedural;
@@ -92,8 +92,8 @@ fn rows_equal_texels_one_by_one() {
 }
 
 /// The lobe cut at an order, its ringing clamped as the method clamps it.
-fn band_limited(brdf: &dyn Brdf, order: usize, u: f64) -> f64 {
-    let rho = brdf.zonal(order);
+fn band_limited(lobe: &dyn Lobe, order: usize, u: f64) -> f64 {
+    let rho = lobe.zonal(order);
     let series = |l: usize| (2 * l + 1) as f64 / (4.0 * std::f64::consts::PI) * rho[l];
     legendre(order, u).iter().enumerate().map(|(l, p)| series(l) * p).sum::<f64>().max(0.0)
 }
@@ -105,17 +105,17 @@ fn a_flat_map_gives_back_the_brdf_at_every_level() {
     for method in methods() {
         let pyramid = bake(&*method, &flat, Precision::Single);
         for spelling in brdf::TABLE.iter().flat_map(|row| row.samples) {
-            let brdf = brdf::parse(spelling).unwrap();
-            let evaluator = method.evaluator(&*brdf, &lattice.directions);
-            let peak = brdf.evaluate(1.0);
+            let lobe = brdf::parse(spelling).unwrap();
+            let evaluator = method.evaluator(&*lobe, &lattice.directions);
+            let peak = lobe.evaluate(1.0);
             for (level, size) in pyramid.sizes().iter().enumerate() {
                 let mut got = vec![0.0; lattice.len()];
                 evaluator.evaluate(&pyramid.texel(level, size.width - 1, size.height / 2), &mut got);
                 for (got, w) in got.iter().zip(&lattice.directions) {
-                    let expected = match method.flat_lobe(&*brdf) {
-                        FlatLobe::Exact => brdf.evaluate(w.z),
+                    let expected = match method.flat_lobe(&*lobe) {
+                        FlatLobe::Exact => lobe.evaluate(w.z),
                         FlatLobe::BandLimited(_) if method.spelling().ends_with("printed") => continue,
-                        FlatLobe::BandLimited(order) => band_limited(&*brdf, order, w.z),
+                        FlatLobe::BandLimited(order) => band_limited(&*lobe, order, w.z),
                         FlatLobe::OwnKernel => continue,
                     };
                     // 1e-4 of the peak is the promise; single-precision storage leaves about 1e-6.
@@ -139,11 +139,11 @@ fn a_lobe_within_the_band_limit_comes_back_whole() {
     let pyramid = bake(&*method, &flat, Precision::Single);
     let lattice = DiskLattice::new(24, 0.97);
     for spelling in ["blinn-phong:3", "blinn-phong:10"] {
-        let brdf = brdf::parse(spelling).unwrap();
+        let lobe = brdf::parse(spelling).unwrap();
         let mut got = vec![0.0; lattice.len()];
-        method.evaluator(&*brdf, &lattice.directions).evaluate(&pyramid.texel(1, 0, 0), &mut got);
+        method.evaluator(&*lobe, &lattice.directions).evaluate(&pyramid.texel(1, 0, 0), &mut got);
         for (got, w) in got.iter().zip(&lattice.directions) {
-            assert!((got - brdf.evaluate(w.z)).abs() < 1e-4 * brdf.evaluate(1.0), "{spelling} {w}");
+            assert!((got - lobe.evaluate(w.z)).abs() < 1e-4 * lobe.evaluate(1.0), "{spelling} {w}");
         }
     }
 }
@@ -246,8 +246,8 @@ fn degenerate_normals_stay_finite() {
             let pyramid = bake(&*method, &surface, precision);
             for spelling in ["lambert", "blinn-phong:50", "ggx:0.01", "beckmann:0.5", "torrance-sparrow:0.1"]
             {
-                let brdf = brdf::parse(spelling).unwrap();
-                let evaluator = method.evaluator(&*brdf, &lattice.directions);
+                let lobe = brdf::parse(spelling).unwrap();
+                let evaluator = method.evaluator(&*lobe, &lattice.directions);
                 for (level, size) in pyramid.sizes().iter().enumerate() {
                     for i in 0..size.area() {
                         let mut out = vec![0.0; lattice.len()];
@@ -308,12 +308,12 @@ fn half_floats_and_sharp_lobes_stay_in_bounds() {
     for method in methods() {
         let pyramid = bake(&*method, &*surface, Precision::Half);
         for spelling in ["beckmann:0.01", "blinn-phong:20000", "ggx:0.003"] {
-            let brdf = brdf::parse(spelling).unwrap();
-            let evaluator = method.evaluator(&*brdf, &lattice.directions);
+            let lobe = brdf::parse(spelling).unwrap();
+            let evaluator = method.evaluator(&*lobe, &lattice.directions);
             for i in 0..256 {
                 let mut out = vec![0.0; lattice.len()];
                 evaluator.evaluate(&pyramid.texel(1, i % 64, i / 4), &mut out);
-                let bound = 20.0 * brdf.evaluate(1.0);
+                let bound = 20.0 * lobe.evaluate(1.0);
                 assert!(
                     out.iter().all(|f| *f >= 0.0 && *f <= bound),
                     "{} {spelling} texel {i}",
@@ -328,9 +328,9 @@ fn half_floats_and_sharp_lobes_stay_in_bounds() {
 fn any_finite_channels_decode_to_something_finite() {
     // What a damaged but well-formed file can hold.
     for method in methods() {
-        let brdf = brdf::parse("blinn-phong:50").unwrap();
+        let lobe = brdf::parse("blinn-phong:50").unwrap();
         let directions = [DVec3::Z, DVec3::new(0.6, 0.0, 0.8)];
-        let evaluator = method.evaluator(&*brdf, &directions);
+        let evaluator = method.evaluator(&*lobe, &directions);
         for fill in [0.0, 1.0, -1.0, 65504.0, -65504.0, 1e-7] {
             let channels = vec![fill; 4 * method.layers()];
             let mut out = [0.0; 2];
@@ -352,7 +352,7 @@ fn effective_lobes_keep_their_energy() {
             0.2 * ((y * 3 + x) % 8) as f32 / 8.0 - 0.1,
         ))
     });
-    let brdf = brdf::parse("blinn-phong:30").unwrap();
+    let lobe = brdf::parse("blinn-phong:30").unwrap();
     let mut directions = Vec::new();
     let mut weights = Vec::new();
     for (z, weight) in gauss_legendre(64) {
@@ -365,13 +365,13 @@ fn effective_lobes_keep_their_energy() {
     }
     for method in methods() {
         let name = method.spelling();
-        let too_narrow = matches!(method.flat_lobe(&*brdf), FlatLobe::BandLimited(order) if order < 11);
+        let too_narrow = matches!(method.flat_lobe(&*lobe), FlatLobe::BandLimited(order) if order < 11);
         if too_narrow || name.starts_with("ndm") && !name.ends_with("integrated") {
             continue;
         }
         let pyramid = bake(&*method, &surface, Precision::Single);
         let mut out = vec![0.0; directions.len()];
-        method.evaluator(&*brdf, &directions).evaluate(&pyramid.texel(3, 0, 0), &mut out);
+        method.evaluator(&*lobe, &directions).evaluate(&pyramid.texel(3, 0, 0), &mut out);
         let total: f64 = out.iter().zip(&weights).map(|(f, w)| f * w).sum();
         // Slopes and the plane place a lobe by shifting it, which only near the vertical is a rotation, and factors are
         // interpolated: a few percent. Else the quadrature and, for sh:16, ringing of rho_17 = 0.7 %.

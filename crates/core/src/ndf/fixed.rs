@@ -6,10 +6,10 @@
 
 use glam::{DVec2, DVec3, Vec2};
 
-use super::mixture::{Cosine, Shaded, cosine};
+use super::mixture::{Cosine, NormalLobe, cosine};
 use super::naive::UnitMean;
 use super::{Representation, Row, Sample, no_parameters};
-use crate::brdf::Brdf;
+use crate::brdf::Lobe;
 use crate::shader::Shader;
 
 /// The do-nothing baseline.
@@ -66,8 +66,8 @@ impl Representation for Fixed {
         lobes.alone().mean
     }
 
-    fn effective<'a>(&'a self, lobes: &UnitMean, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        lobes.effective(brdf)
+    fn effective<'a>(&'a self, lobes: &UnitMean, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+        lobes.effective(lobe)
     }
 
     fn shader(&self) -> Shader {
@@ -78,7 +78,7 @@ impl Representation for Fixed {
         ])
     }
 
-    fn isotropic(&self, lobes: &UnitMean) -> Option<(Cosine, Vec<Shaded>)> {
+    fn isotropic(&self, lobes: &UnitMean) -> Option<(Cosine, Vec<NormalLobe>)> {
         Some((cosine, vec![lobes.alone()]))
     }
 }

@@ -2,7 +2,7 @@
 
 const NORMALISED: bool = false;
 
-fn decode_lobe(sums: vec4<f32>) -> Shaded {
+fn decode_lobe(sums: vec4<f32>) -> NormalLobe {
     let xy = sums.xy;
-    return Shaded(direction_or_up(vec3<f32>(xy, sqrt(max(1.0 - dot(xy, xy), 0.0)))), 1.0, 0.0);
+    return NormalLobe(direction_or_up(vec3<f32>(xy, sqrt(max(1.0 - dot(xy, xy), 0.0)))), 1.0, 0.0);
 }

@@ -8,9 +8,9 @@
 
 use glam::{DVec2, DVec3};
 
-use super::mixture::{Cosine, Lobes, MixtureEvaluator, Shaded, effective, mean_of, parse_mixture};
+use super::mixture::{Cosine, LobeSums, MixtureEvaluator, NormalLobe, effective, mean_of, parse_mixture};
 use super::{Decoded, Evaluator, Method, PlanarLobe, Representation, Row, Sample};
-use crate::brdf::Brdf;
+use crate::brdf::Lobe;
 use crate::fit::{Fit, Four, LobeKind};
 use crate::shader::Shader;
 use crate::units::SlopeVariance;
@@ -41,12 +41,12 @@ fn parse(words: &[&str]) -> Result<Box<dyn Method>, String> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct GaussianMixture {
     /// Lobes that are alive.
-    pub lobes: Vec<Shaded>,
+    pub lobes: Vec<NormalLobe>,
 }
 
 impl From<GaussianMixture> for Decoded {
     fn from(mixture: GaussianMixture) -> Self {
-        let lobe = |l: &Shaded| PlanarLobe {
+        let lobe = |l: &NormalLobe| PlanarLobe {
             layer: l.layer,
             weight: l.weight,
             mean: l.mean.truncate(),
@@ -68,7 +68,7 @@ fn planar_cosine(w: DVec3, mu: DVec3) -> f64 {
 }
 
 impl Gmm {
-    fn lobes(&self, sums: &Lobes) -> Vec<Shaded> {
+    fn lobes(&self, sums: &LobeSums) -> Vec<NormalLobe> {
         let total = sums.total();
         let lobe = |(layer, &[alpha, x, y, q]): (usize, &Four)| {
             let alpha = f64::from(alpha);
@@ -77,14 +77,14 @@ impl Gmm {
             let variance = SlopeVariance::clamped(if self.printed { second } else { second / 2.0 });
             // Damaged files aside, means lie in the unit disk.
             let mean = DVec3::new(x.clamp(-1.5, 1.5), y.clamp(-1.5, 1.5), 0.0);
-            Shaded { layer, weight: alpha / total, mean, variance }
+            NormalLobe { layer, weight: alpha / total, mean, variance }
         };
         sums.alive().map(lobe).collect()
     }
 }
 
 impl Representation for Gmm {
-    type Sums = Lobes;
+    type Sums = LobeSums;
     type Lobes = GaussianMixture;
 
     fn spelling(&self) -> String {
@@ -99,29 +99,29 @@ impl Representation for Gmm {
         if self.printed { "sums-as-printed" } else { "sums" }
     }
 
-    fn zero(&self) -> Lobes {
-        Lobes::zero(self.fit.lobes)
+    fn zero(&self) -> LobeSums {
+        LobeSums::zero(self.fit.lobes)
     }
 
     /// Without a fit, all normals go to the first lobe.
-    fn accumulate(&self, sums: &mut Lobes, sample: &Sample, weight: f32) {
+    fn accumulate(&self, sums: &mut LobeSums, sample: &Sample, weight: f32) {
         let [x, y, _] = sample.normal.to_array();
         sums.add(0, [1.0, x, y, x * x + y * y], weight);
     }
 
-    fn blend(&self, sums: &mut Lobes, part: &Lobes, weight: f32) {
+    fn blend(&self, sums: &mut LobeSums, part: &LobeSums, weight: f32) {
         sums.blend(part, weight);
     }
 
-    fn pack(&self, sums: &Lobes, channels: &mut [f32]) {
+    fn pack(&self, sums: &LobeSums, channels: &mut [f32]) {
         sums.to_channels(channels);
     }
 
-    fn unpack(&self, channels: &[f32]) -> Lobes {
-        Lobes::from_channels(self.fit.lobes, channels)
+    fn unpack(&self, channels: &[f32]) -> LobeSums {
+        LobeSums::from_channels(self.fit.lobes, channels)
     }
 
-    fn decode(&self, sums: &Lobes) -> GaussianMixture {
+    fn decode(&self, sums: &LobeSums) -> GaussianMixture {
         GaussianMixture { lobes: self.lobes(sums) }
     }
 
@@ -132,9 +132,9 @@ impl Representation for Gmm {
     fn effective<'a>(
         &'a self,
         lobes: &GaussianMixture,
-        brdf: &'a dyn Brdf,
+        lobe: &'a dyn Lobe,
     ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        effective(&lobes.lobes, brdf, planar_cosine)
+        effective(&lobes.lobes, lobe, planar_cosine)
     }
 
     fn shader(&self) -> Shader {
@@ -142,13 +142,13 @@ impl Representation for Gmm {
             .constant("PRINTED", self.printed)
     }
 
-    fn isotropic(&self, lobes: &GaussianMixture) -> Option<(Cosine, Vec<Shaded>)> {
+    fn isotropic(&self, lobes: &GaussianMixture) -> Option<(Cosine, Vec<NormalLobe>)> {
         Some((planar_cosine, lobes.lobes.clone()))
     }
 
-    fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
+    fn evaluator<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
         let lobes = |channels: &[f32]| self.lobes(&self.unpack(channels));
-        Box::new(MixtureEvaluator { lobes, cosine: planar_cosine, brdf, directions })
+        Box::new(MixtureEvaluator { lobes, cosine: planar_cosine, lobe, directions })
     }
 
     fn fit(&self) -> Option<Fit> {

@@ -5,16 +5,16 @@ const NORMALISED: bool = true;
 // Share of a texel's weight below which a lobe says nothing.
 const DEAD: f32 = 1e-5;
 
-fn decode_lobe(sums: vec4<f32>) -> Shaded {
+fn decode_lobe(sums: vec4<f32>) -> NormalLobe {
     let alpha = sums.x;
     if !(alpha > DEAD) {
-        return Shaded(vec3<f32>(0.0), 0.0, 0.0);
+        return NormalLobe(vec3<f32>(0.0), 0.0, 0.0);
     }
     let xy = sums.yz / alpha;
     let second = max(sums.w / alpha - dot(xy, xy), 0.0);
     // Damaged files aside, means lie in the unit disk.
     let held = clamp(xy, vec2<f32>(-1.5), vec2<f32>(1.5));
-    return Shaded(vec3<f32>(held, 0.0), alpha, select(second / 2.0, second, PRINTED));
+    return NormalLobe(vec3<f32>(held, 0.0), alpha, select(second / 2.0, second, PRINTED));
 }
 
 // w · n of a normal as far from `w` as the two are in the plane; below the horizon nothing is reflected.

@@ -14,9 +14,8 @@
 use glam::{DMat2, DVec2, DVec3};
 
 use super::slopes::{SlopeGaussian, mahalanobis, root_of_determinant};
-use super::{FilteredTexel, Lit};
-use crate::brdf::Brdf;
-use crate::reflection::{Model, Reflection, Way};
+use super::{FilteredTexel, IncidentLight};
+use crate::brdf::{Brdf, Directions, Lobe, ShadingModel};
 
 /// Weight of the artificial normal that keeps silhouettes defined (section 3.7).
 const ARTIFICIAL_WEIGHT: f64 = 1e-5;
@@ -51,13 +50,13 @@ impl SlopeGaussian {
 
     /// Projected area of the facets that face a direction, whether or not others hide them: `a (1 + Lambda)`.
     #[must_use]
-    pub fn visible_area(&self, lobe: &dyn Brdf, w: DVec3) -> f64 {
+    pub fn visible_area(&self, lobe: &dyn Lobe, w: DVec3) -> f64 {
         lobe.visible_area(self.projected_area(w), self.projected_deviation(w))
     }
 
     /// Smith's `Lambda(w)`, exactly; infinite where the mean normal faces away.
     #[must_use]
-    pub fn lambda(&self, lobe: &dyn Brdf, w: DVec3) -> f64 {
+    pub fn lambda(&self, lobe: &dyn Lobe, w: DVec3) -> f64 {
         let area = self.projected_area(w);
         if area > 0.0 { (self.visible_area(lobe, w) / area - 1.0).max(0.0) } else { f64::INFINITY }
     }
@@ -73,7 +72,7 @@ impl SlopeGaussian {
     /// D(n): area of facets per solid angle of their normals, per unit of map area, for slopes distributed as those of `lobe` are, and the
     /// lobe's own width in the covariance already.
     #[must_use]
-    pub fn facets(&self, lobe: &dyn Brdf, n: DVec3) -> f64 {
+    pub fn facets(&self, lobe: &dyn Lobe, n: DVec3) -> f64 {
         if n.z <= 0.0 {
             return 0.0;
         }
@@ -103,7 +102,12 @@ impl SlopeGaussian {
         for i in 0..grid.n * grid.n {
             let (at, weight, step) = grid.point(i);
             let slope = self.mean + DVec2::new(deviation * at.x, shear * at.x + rest * at.y);
-            each(SlopeSample { leaning: (-slope).extend(1.0), weight, square: at.length_squared(), step });
+            each(SlopeSample {
+                slope_normal: (-slope).extend(1.0),
+                weight,
+                square: at.length_squared(),
+                step,
+            });
         }
     }
 
@@ -111,7 +115,7 @@ impl SlopeGaussian {
     /// share of slopes mirrors to (section 3.5, in its form and with its constants).
     pub(super) fn level(&self, grid: &SlopeGrid, sample: &SlopeSample, u: f64, side: usize) -> f64 {
         let [xx, yy, _] = self.covariance;
-        let z = sample.leaning.length().recip();
+        let z = sample.slope_normal.length().recip();
         let jacobian = 4.0 * u * z.powi(3);
         0.72 * jacobian.ln() + grid.level_offset() + (sample.step * xx.max(yy).sqrt() * side as f64).log2()
     }
@@ -121,7 +125,7 @@ impl SlopeGaussian {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SlopeSample {
     /// Its normal over the normal's z: minus the slope, and one.
-    pub(super) leaning: DVec3,
+    pub(super) slope_normal: DVec3,
     /// Its weight; all of them add up to one.
     pub(super) weight: f64,
     /// Squared distance from the mean, in deviations.
@@ -213,56 +217,60 @@ fn hash(v: u32) -> u32 {
 }
 
 /// Light from specular facets along a way, per unit of irradiance, Fresnel's term apart. `spread` holds the lobe's own width already.
-fn specular(reflection: &Reflection, spread: &SlopeGaussian, texel: &FilteredTexel<'_>, way: &Way) -> f64 {
-    let lobe = &*reflection.lobe;
-    let gloss = (texel.finish)(None).gloss;
-    let lit = spread.facets(lobe, way.wh) / 4.0;
+fn specular(brdf: &Brdf, spread: &SlopeGaussian, texel: &FilteredTexel<'_>, directions: &Directions) -> f64 {
+    let lobe = &*brdf.lobe;
+    let roughness = (texel.params)(None).roughness;
+    let lit = spread.facets(lobe, directions.wh) / 4.0;
     if texel.at_means {
         // As printed: of what it divides by nothing is clamped but in the rational form itself.
-        let shadow = if reflection.model == Model::Shadowed { spread.lambda_rational(way.wi) } else { 0.0 };
-        return lit / (spread.projected_area(way.wo) * (1.0 + spread.lambda_rational(way.wo) + shadow));
+        let shadow =
+            if brdf.shading == ShadingModel::Shadowed { spread.lambda_rational(directions.wi) } else { 0.0 };
+        return lit
+            / (spread.projected_area(directions.wo)
+                * (1.0 + spread.lambda_rational(directions.wo) + shadow));
     }
-    let Some(shadow) = shadow(reflection, spread, way) else { return 0.0 };
-    let (n, seen) = spread.artificial(way.wo);
-    let facet = reflection.lobe.evaluate_widened(gloss, n.dot(way.wh)) * reflection.factor(n, way, gloss);
-    (lit + seen * facet) / (spread.visible_area(lobe, way.wo) + seen + shadow)
+    let Some(shadow) = shadow(brdf, spread, directions) else { return 0.0 };
+    let (n, seen) = spread.artificial(directions.wo);
+    let facet =
+        brdf.lobe.evaluate_widened(roughness, n.dot(directions.wh)) * brdf.factor(n, directions, roughness);
+    (lit + seen * facet) / (spread.visible_area(lobe, directions.wo) + seen + shadow)
 }
 
 /// `a(wo) Lambda(wi)`, where shadows are asked for; `None` where all is in shadow.
-fn shadow(reflection: &Reflection, spread: &SlopeGaussian, way: &Way) -> Option<f64> {
-    if reflection.model != Model::Shadowed {
+fn shadow(brdf: &Brdf, spread: &SlopeGaussian, directions: &Directions) -> Option<f64> {
+    if brdf.shading != ShadingModel::Shadowed {
         return Some(0.0);
     }
-    let lambda = spread.lambda(&*reflection.lobe, way.wi);
-    lambda.is_finite().then(|| spread.projected_area(way.wo).max(0.0) * lambda)
+    let lambda = spread.lambda(&*brdf.lobe, directions.wi);
+    lambda.is_finite().then(|| spread.projected_area(directions.wo).max(0.0) * lambda)
 }
 
 /// Light from diffuse facets along a way, per unit of irradiance, times pi over their albedo.
-fn diffuse(reflection: &Reflection, g: &SlopeGaussian, grid: &SlopeGrid, way: &Way) -> f64 {
-    let Some(shadow) = shadow(reflection, g, way) else { return 0.0 };
+fn diffuse(brdf: &Brdf, g: &SlopeGaussian, grid: &SlopeGrid, directions: &Directions) -> f64 {
+    let Some(shadow) = shadow(brdf, g, directions) else { return 0.0 };
     let (mut lit, mut seen) = (0.0, 0.0);
-    g.samples(grid, |SlopeSample { leaning, weight, .. }| {
-        let visible = weight * leaning.dot(way.wo).max(0.0);
+    g.samples(grid, |SlopeSample { slope_normal, weight, .. }| {
+        let visible = weight * slope_normal.dot(directions.wo).max(0.0);
         seen += visible;
-        lit += visible * leaning.dot(way.wi).max(0.0) / leaning.length();
+        lit += visible * slope_normal.dot(directions.wi).max(0.0) / slope_normal.length();
     });
-    let (n, visible) = g.artificial(way.wo);
-    (lit + visible * n.dot(way.wi).max(0.0)) / (seen + visible + shadow)
+    let (n, visible) = g.artificial(directions.wo);
+    (lit + visible * n.dot(directions.wi).max(0.0)) / (seen + visible + shadow)
 }
 
 /// Light that a filtered texel of a displaced surface sends to the eye.
 pub(super) fn reflect(
     (g, grid): (&SlopeGaussian, &SlopeGrid),
     texel: &FilteredTexel<'_>,
-    reflection: &Reflection,
-    lights: &[Lit],
+    brdf: &Brdf,
+    lights: &[IncidentLight],
 ) -> DVec3 {
-    let finish = (texel.finish)(None);
-    let spread = g.widen(reflection.width(finish.gloss));
-    let of = |Lit { way, irradiance }: &Lit| {
-        let specular = if reflection.is_specular() { specular(reflection, &spread, texel, way) } else { 0.0 };
-        let parts = (specular, diffuse(reflection, g, grid, way));
-        *irradiance * super::reflect::together(reflection, &finish, way, parts)
+    let params = (texel.params)(None);
+    let spread = g.widen(brdf.width(params.roughness));
+    let of = |IncidentLight { directions, irradiance }: &IncidentLight| {
+        let specular = if brdf.is_specular() { specular(brdf, &spread, texel, directions) } else { 0.0 };
+        let parts = (specular, diffuse(brdf, g, grid, directions));
+        *irradiance * super::reflect::combine(brdf, &params, directions, parts)
     };
     lights.iter().map(of).sum()
 }
@@ -292,7 +300,7 @@ mod tests {
     }
 
     /// `∫ f(n) D(n) dn`, over slopes: the grid is even along the axes of the covariance, in deviations from -9 to 9.
-    fn over_facets(g: &SlopeGaussian, lobe: &dyn Brdf, f: impl Fn(DVec3) -> f64) -> f64 {
+    fn over_facets(g: &SlopeGaussian, lobe: &dyn Lobe, f: impl Fn(DVec3) -> f64) -> f64 {
         let [xx, yy, xy] = g.covariance;
         let (deviation, shear) = (xx.sqrt(), xy / xx.sqrt());
         let rest = (yy - shear * shear).sqrt();
@@ -373,48 +381,50 @@ mod tests {
         }
     }
 
-    fn lit(texel: (&SlopeGaussian, usize), reflection: &Reflection, way: Way, at_means: bool) -> DVec3 {
-        let finish = crate::reflection::Finish {
+    fn lit(texel: (&SlopeGaussian, usize), brdf: &Brdf, directions: Directions, at_means: bool) -> DVec3 {
+        let params = crate::brdf::SurfaceParams {
             diffuse: DVec3::splat(0.5),
             specular: DVec3::splat(0.04),
-            gloss: SlopeVariance::ZERO,
+            roughness: SlopeVariance::ZERO,
         };
         let method = super::super::parse("slopes").unwrap();
-        let prepared = method.prepare(reflection, SlopeVariance::ZERO);
+        let prepared = method.prepare(brdf, SlopeVariance::ZERO);
         let filtered = FilteredTexel {
             channels: &[],
-            finish: &|_| finish,
+            params: &|_| params,
             prepared: &prepared,
             at_means,
-            relief: Some(DMat2::IDENTITY),
+            slope_map: Some(DMat2::IDENTITY),
         };
         reflect(
             (texel.0, &SlopeGrid::new(texel.1)),
             &filtered,
-            reflection,
-            &[Lit { way, irradiance: DVec3::ONE }],
+            brdf,
+            &[IncidentLight { directions, irradiance: DVec3::ONE }],
         )
     }
 
     #[test]
     fn a_flat_surface_is_its_own_facet() {
-        for model in [Model::Masked, Model::Shadowed] {
+        for shading in [ShadingModel::Masked, ShadingModel::Shadowed] {
             for lobe in ["beckmann:0.3", "ggx:0.3"] {
-                let reflection = Reflection { lobe: brdf::parse(lobe).unwrap(), model };
+                let brdf = Brdf { lobe: brdf::parse(lobe).unwrap(), shading };
                 let flat = SlopeGaussian { height: 0.0, mean: DVec2::ZERO, covariance: [0.0; 3] };
-                let way =
-                    Way::new(DVec3::new(0.5, 0.1, 0.5).normalize(), DVec3::new(-0.3, 0.2, 0.2).normalize());
-                let way = way.unwrap();
-                let finish = crate::reflection::Finish {
+                let directions = Directions::new(
+                    DVec3::new(0.5, 0.1, 0.5).normalize(),
+                    DVec3::new(-0.3, 0.2, 0.2).normalize(),
+                );
+                let directions = directions.unwrap();
+                let params = crate::brdf::SurfaceParams {
                     diffuse: DVec3::splat(0.5),
                     specular: DVec3::splat(0.04),
-                    gloss: SlopeVariance::ZERO,
+                    roughness: SlopeVariance::ZERO,
                 };
                 let (got, facet) =
-                    (lit((&flat, 5), &reflection, way, false), reflection.facet(DVec3::Z, &finish, &way));
+                    (lit((&flat, 5), &brdf, directions, false), brdf.facet(DVec3::Z, &params, &directions));
                 // The diffuse part of the shadowed model: a lone facet has no other to shade it.
                 // The artificial normal weighs 1e-5 × 1e-6 of what is seen.
-                assert!((got - facet).length() < 1e-8 * facet.length(), "{model:?} {lobe}: {got} {facet}");
+                assert!((got - facet).length() < 1e-8 * facet.length(), "{shading:?} {lobe}: {got} {facet}");
             }
         }
     }
@@ -437,14 +447,14 @@ mod tests {
             if i % 2 == 0 {
                 wo = (wo * DVec3::new(1.0, 1.0, 1e-4)).normalize();
             }
-            let Some(way) = Way::between(unit(&mut random), wo) else { continue };
-            for model in [Model::Masked, Model::Shadowed] {
+            let Some(directions) = Directions::between(unit(&mut random), wo) else { continue };
+            for shading in [ShadingModel::Masked, ShadingModel::Shadowed] {
                 for lobe in ["beckmann:0.02", "beckmann:0.5", "ggx:0.1", "lambert"] {
-                    let reflection = Reflection { lobe: brdf::parse(lobe).unwrap(), model };
-                    let light = lit((&g, 5), &reflection, way, false);
+                    let brdf = Brdf { lobe: brdf::parse(lobe).unwrap(), shading };
+                    let light = lit((&g, 5), &brdf, directions, false);
                     assert!(
                         light.is_finite() && light.min_element() >= 0.0,
-                        "{model:?} {lobe}: {light}, {g:?} {way:?}"
+                        "{shading:?} {lobe}: {light}, {g:?} {directions:?}"
                     );
                 }
             }
@@ -453,11 +463,12 @@ mod tests {
 
     #[test]
     fn the_printed_form_is_ours_where_it_is_defined() {
-        let reflection = Reflection { lobe: brdf::parse("beckmann:0.2").unwrap(), model: Model::Shadowed };
+        let brdf = Brdf { lobe: brdf::parse("beckmann:0.2").unwrap(), shading: ShadingModel::Shadowed };
         let g = SlopeGaussian { height: 0.0, mean: DVec2::new(0.1, -0.2), covariance: [0.05, 0.03, 0.01] };
-        let way = Way::new(DVec3::new(0.5, 0.3, 0.8).normalize(), DVec3::new(-0.6, 0.2, 0.4).normalize());
-        let way = way.unwrap();
-        let [ours, printed] = [false, true].map(|at_means| lit((&g, 5), &reflection, way, at_means).x);
+        let directions =
+            Directions::new(DVec3::new(0.5, 0.3, 0.8).normalize(), DVec3::new(-0.6, 0.2, 0.4).normalize());
+        let directions = directions.unwrap();
+        let [ours, printed] = [false, true].map(|at_means| lit((&g, 5), &brdf, directions, at_means).x);
         // Walter's form errs by 0.35 % at most.
         assert!((ours / printed - 1.0).abs() < 0.0035 && ours != printed, "{ours} {printed}");
     }

@@ -31,7 +31,7 @@ fn projected_deviation(g: Decoded, w: vec3<f32>) -> f32 {
 
 // Smith's Lambda, exactly, where `area` is above zero.
 fn lambda(g: Decoded, w: vec3<f32>, area: f32) -> f32 {
-    return max(brdf_visible_area(area, projected_deviation(g, w)) / area - 1.0, 0.0);
+    return max(lobe_visible_area(area, projected_deviation(g, w)) / area - 1.0, 0.0);
 }
 
 // The same in Walter et al.'s rational form, with the paper's clamps.
@@ -47,7 +47,7 @@ fn facets(g: Decoded, base: f32, n: vec3<f32>) -> f32 {
     }
     let square = mahalanobis(g.covariance, -n.xy / n.z - g.mean);
     let z2 = n.z * n.z;
-    return brdf_slope_profile(base, square) * inverseSqrt(determinant_of(g.covariance)) / (z2 * z2);
+    return lobe_slope_profile(base, square) * inverseSqrt(determinant_of(g.covariance)) / (z2 * z2);
 }
 
 // A normal that the eye sees where it sees no other, and how much of it.
@@ -80,7 +80,7 @@ fn slope_point(i: u32) -> vec4<f32> {
 }
 
 // The normal of a slope of the grid, over its z.
-fn leaning(g: Decoded, at: vec2<f32>) -> vec3<f32> {
+fn slope_normal(g: Decoded, at: vec2<f32>) -> vec3<f32> {
     let deviation = sqrt(g.covariance.x);
     let shear = select(0.0, g.covariance.z / deviation, deviation > 0.0);
     let rest = sqrt(max(g.covariance.y - shear * shear, 0.0));
@@ -88,42 +88,42 @@ fn leaning(g: Decoded, at: vec2<f32>) -> vec3<f32> {
 }
 
 // What shadows take: `a(wo) Lambda(wi)`; below zero where all is in shadow.
-fn shadow(reflection: Reflection, g: Decoded, way: Way) -> f32 {
-    if reflection.model != SHADOWED {
+fn shadow(brdf: Brdf, g: Decoded, directions: Directions) -> f32 {
+    if brdf.shading != SHADOWED {
         return 0.0;
     }
-    let area = projected_area(g, way.wi);
+    let area = projected_area(g, directions.wi);
     if area <= 0.0 {
         return -1.0;
     }
-    return max(projected_area(g, way.wo), 0.0) * lambda(g, way.wi, area);
+    return max(projected_area(g, directions.wo), 0.0) * lambda(g, directions.wi, area);
 }
 
 // Light from specular facets. `spread` holds the lobe's own width already.
-fn displaced_specular(reflection: Reflection, spread: Decoded, gloss: f32, way: Way) -> f32 {
-    let lit = 0.25 * facets(spread, reflection.base, way.wh);
-    if reflection.at_means == 1u {
-        var hidden = 1.0 + lambda_rational(spread, way.wo);
-        if reflection.model == SHADOWED {
-            hidden += lambda_rational(spread, way.wi);
+fn displaced_specular(brdf: Brdf, spread: Decoded, roughness: f32, directions: Directions) -> f32 {
+    let lit = 0.25 * facets(spread, brdf.base, directions.wh);
+    if brdf.at_means == 1u {
+        var hidden = 1.0 + lambda_rational(spread, directions.wo);
+        if brdf.shading == SHADOWED {
+            hidden += lambda_rational(spread, directions.wi);
         }
-        return lit / (projected_area(spread, way.wo) * hidden);
+        return lit / (projected_area(spread, directions.wo) * hidden);
     }
-    let shadow = shadow(reflection, spread, way);
+    let shadow = shadow(brdf, spread, directions);
     if shadow < 0.0 {
         return 0.0;
     }
-    let artificial = artificial_normal(spread, way.wo);
+    let artificial = artificial_normal(spread, directions.wo);
     let seen = ARTIFICIAL_WEIGHT * artificial.w;
-    let lobe = brdf_evaluate(brdf_widen(reflection.base, gloss), dot(artificial.xyz, way.wh));
-    let facet = lobe * factor(reflection, artificial.xyz, way, gloss);
-    let area = brdf_visible_area(projected_area(spread, way.wo), projected_deviation(spread, way.wo));
+    let lobe = lobe_evaluate(lobe_widen(brdf.base, roughness), dot(artificial.xyz, directions.wh));
+    let facet = lobe * factor(brdf, artificial.xyz, directions, roughness);
+    let area = lobe_visible_area(projected_area(spread, directions.wo), projected_deviation(spread, directions.wo));
     return (lit + seen * facet) / (area + seen + shadow);
 }
 
 // Light from diffuse facets, times pi over their albedo.
-fn displaced_diffuse(reflection: Reflection, g: Decoded, way: Way) -> f32 {
-    let shadow = shadow(reflection, g, way);
+fn displaced_diffuse(brdf: Brdf, g: Decoded, directions: Directions) -> f32 {
+    let shadow = shadow(brdf, g, directions);
     if shadow < 0.0 {
         return 0.0;
     }
@@ -131,31 +131,31 @@ fn displaced_diffuse(reflection: Reflection, g: Decoded, way: Way) -> f32 {
     var seen = 0.0;
     for (var i = 0u; i < GRID * GRID; i++) {
         let point = slope_point(i);
-        let n = leaning(g, point.xy);
-        let visible = point.z * max(dot(n, way.wo), 0.0);
+        let n = slope_normal(g, point.xy);
+        let visible = point.z * max(dot(n, directions.wo), 0.0);
         seen += visible;
-        lit += visible * max(dot(n, way.wi), 0.0) * inverseSqrt(dot(n, n));
+        lit += visible * max(dot(n, directions.wi), 0.0) * inverseSqrt(dot(n, n));
     }
-    let artificial = artificial_normal(g, way.wo);
+    let artificial = artificial_normal(g, directions.wo);
     let visible = ARTIFICIAL_WEIGHT * artificial.w;
-    return (lit + visible * max(dot(artificial.xyz, way.wi), 0.0)) / (seen + visible + shadow);
+    return (lit + visible * max(dot(artificial.xyz, directions.wi), 0.0)) / (seen + visible + shadow);
 }
 
 // Light that a filtered texel of a displaced surface sends along the way, per unit of irradiance; `by` is how slopes of the map lie on it.
 fn reflect_displaced(
     channels: ptr<function, Channels>,
     decoded: ptr<function, Decoded>,
-    plain: Finish,
-    reflection: Reflection,
-    way: Way,
+    plain: SurfaceParams,
+    brdf: Brdf,
+    directions: Directions,
     by: mat2x2<f32>,
 ) -> vec3<f32> {
     let g = stretched_by(*decoded, by);
     var specular = 0.0;
     if SPECULAR {
-        let width = lobe_width(reflection, plain.gloss);
+        let width = brdf_width(brdf, plain.roughness);
         let spread = Decoded(g.mean, g.covariance + vec3<f32>(width, width, 0.0));
-        specular = displaced_specular(reflection, spread, plain.gloss, way);
+        specular = displaced_specular(brdf, spread, plain.roughness, directions);
     }
-    return together(reflection, plain, way, specular, displaced_diffuse(reflection, g, way));
+    return combine(brdf, plain, directions, specular, displaced_diffuse(brdf, g, directions));
 }

@@ -3,13 +3,13 @@
 use glam::DVec3;
 
 use super::Evaluator;
-use crate::brdf::Brdf;
+use crate::brdf::Lobe;
 use crate::fit::{Alignment, Fit, Four, LobeKind, MAX_LOBES};
 use crate::units::SlopeVariance;
 
 /// Sums of every lobe: weight, then three statistics times the weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lobes {
+pub struct LobeSums {
     sums: [Four; MAX_LOBES],
     count: usize,
 }
@@ -17,7 +17,7 @@ pub struct Lobes {
 /// Share of a texel's weight below which a lobe says nothing: a few steps of a half float.
 const DEAD: f32 = 1e-5;
 
-impl Lobes {
+impl LobeSums {
     /// Sums over nothing.
     pub(super) fn zero(count: usize) -> Self {
         Self { sums: [[0.0; 4]; MAX_LOBES], count }
@@ -70,7 +70,7 @@ impl Lobes {
 
 /// A decoded lobe, ready to be shaded: the BRDF widened by `variance`, around `mean`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shaded {
+pub struct NormalLobe {
     /// Its layer.
     pub layer: usize,
     /// Share of the texel; they sum to one.
@@ -81,7 +81,7 @@ pub struct Shaded {
     pub variance: SlopeVariance,
 }
 
-impl Shaded {
+impl NormalLobe {
     /// A lobe that is all of a texel.
     pub(super) fn alone(mean: DVec3, variance: SlopeVariance) -> Self {
         Self { layer: 0, weight: 1.0, mean, variance }
@@ -97,7 +97,7 @@ impl Shaded {
 }
 
 /// Mean normal of lobes, a lobe's own being shorter the wider it is.
-pub(super) fn mean_of(lobes: &[Shaded]) -> DVec3 {
+pub(super) fn mean_of(lobes: &[NormalLobe]) -> DVec3 {
     let (mut sum, mut total) = (DVec3::ZERO, 0.0);
     for lobe in lobes {
         sum += lobe.weight * lobe.direction() / (1.0 + lobe.variance.get());
@@ -161,12 +161,12 @@ pub(super) fn cosine(w: DVec3, mu: DVec3) -> f64 {
 
 /// The effective lobe of a mixture: the BRDF widened by each lobe, around its mean.
 pub(super) fn effective<'a>(
-    lobes: &[Shaded],
-    brdf: &'a dyn Brdf,
+    lobes: &[NormalLobe],
+    lobe: &'a dyn Lobe,
     cosine: Cosine,
 ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-    let widened: Vec<(f64, DVec3, Box<dyn Brdf>)> =
-        lobes.iter().map(|l| (l.weight, l.mean, brdf.widen(l.variance))).collect();
+    let widened: Vec<(f64, DVec3, Box<dyn Lobe>)> =
+        lobes.iter().map(|l| (l.weight, l.mean, lobe.widen(l.variance))).collect();
     Box::new(move |w| widened.iter().map(|(weight, mu, lobe)| weight * lobe.evaluate(cosine(w, *mu))).sum())
 }
 
@@ -175,7 +175,7 @@ pub(super) struct MixtureEvaluator<'a, L> {
     /// Decodes channels.
     pub(super) lobes: L,
     pub(super) cosine: Cosine,
-    pub(super) brdf: &'a dyn Brdf,
+    pub(super) lobe: &'a dyn Lobe,
     pub(super) directions: &'a [DVec3],
 }
 
@@ -183,7 +183,7 @@ pub(super) struct MixtureEvaluator<'a, L> {
 const NEGLIGIBLE: f64 = 1e-10;
 
 /// The least cosine at which a falling lobe is not negligible.
-fn least_cosine(lobe: &dyn Brdf) -> f64 {
+fn least_cosine(lobe: &dyn Lobe) -> f64 {
     let peak = lobe.evaluate(1.0);
     let (mut dark, mut bright) = (-1.0, 1.0);
     if lobe.evaluate(dark) > NEGLIGIBLE * peak {
@@ -198,13 +198,13 @@ fn least_cosine(lobe: &dyn Brdf) -> f64 {
 
 impl<L> Evaluator for MixtureEvaluator<'_, L>
 where
-    L: Fn(&[f32]) -> Vec<Shaded> + Send + Sync,
+    L: Fn(&[f32]) -> Vec<NormalLobe> + Send + Sync,
 {
     fn evaluate(&self, channels: &[f32], out: &mut [f64]) {
         out.fill(0.0);
         let (mut places, mut values) = (Vec::new(), Vec::new());
         for lobe in (self.lobes)(channels) {
-            let widened = self.brdf.widen(lobe.variance);
+            let widened = self.lobe.widen(lobe.variance);
             let least = least_cosine(&*widened);
             places.clear();
             values.clear();

@@ -2,7 +2,7 @@
 //
 // A method brings `decode_lobe` (one layer to a lobe, of weight 0 where it says nothing), `cosine`, and NORMALISED.
 
-alias Decoded = array<Shaded, LAYERS>;
+alias Decoded = array<NormalLobe, LAYERS>;
 
 // The lobes that a texel's channels stand for.
 fn decode(channels: ptr<function, Channels>) -> Decoded {
@@ -22,7 +22,7 @@ fn decode(channels: ptr<function, Channels>) -> Decoded {
 }
 
 // The unit direction of a lobe's mean; a planar mean, whose z is 0, is lifted to the sphere.
-fn direction(lobe: Shaded) -> vec3<f32> {
+fn direction(lobe: NormalLobe) -> vec3<f32> {
     let m = lobe.mean;
     let z = select(m.z, sqrt(max(1.0 - m.x * m.x - m.y * m.y, 0.0)), m.z == 0.0);
     return direction_or_up(vec3<f32>(m.xy, z));
@@ -32,9 +32,9 @@ fn direction(lobe: Shaded) -> vec3<f32> {
 fn reflect_texel(
     channels: ptr<function, Channels>,
     lobes: ptr<function, Decoded>,
-    plain: Finish,
-    reflection: Reflection,
-    way: Way,
+    plain: SurfaceParams,
+    brdf: Brdf,
+    directions: Directions,
 ) -> vec3<f32> {
     var sum = vec3<f32>(0.0);
     for (var j = 0u; j < LAYERS; j++) {
@@ -42,22 +42,22 @@ fn reflect_texel(
         if lobe.weight == 0.0 {
             continue;
         }
-        let finish = finish_of(channels, j, plain);
+        let params = params_of(channels, j, plain);
         let mu = direction(lobe);
         var specular = 0.0;
         if SPECULAR {
-            let widened = brdf_widen(reflection.base, lobe.variance + finish.gloss);
-            let f = brdf_evaluate(widened, cosine(way.wh, lobe.mean));
+            let widened = lobe_widen(brdf.base, lobe.variance + params.roughness);
+            let f = lobe_evaluate(widened, cosine(directions.wh, lobe.mean));
             if f > 0.0 {
                 var n = mu;
-                if reflection.at_means == 0u {
-                    n = answering(lobe, mu, lobe_width(reflection, finish.gloss), way.wh);
+                if brdf.at_means == 0u {
+                    n = responding_normal(lobe, mu, brdf_width(brdf, params.roughness), directions.wh);
                 }
-                specular = f * factor(reflection, n, way, finish.gloss);
+                specular = f * factor(brdf, n, directions, params.roughness);
             }
         }
-        let diffuse = lambert_evaluate(lobe.variance, dot(way.wi, mu));
-        sum += lobe.weight * together(reflection, finish, way, specular, diffuse);
+        let diffuse = lambert_evaluate(lobe.variance, dot(directions.wi, mu));
+        sum += lobe.weight * combine(brdf, params, directions, specular, diffuse);
     }
     return sum;
 }

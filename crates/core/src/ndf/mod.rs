@@ -24,27 +24,26 @@ mod vmf;
 #[cfg(test)]
 mod conformance;
 
-pub use environment::Surround;
+pub use environment::LocalEnvironment;
 pub use fixed::Fixed;
 pub use gmm::{GaussianMixture, Gmm};
 pub use leadr::SlopeGrid;
-pub use mixture::{Cosine, Lobes, Shaded};
+pub use mixture::{Cosine, LobeSums, NormalLobe};
 pub use naive::Naive;
-pub use ndm::{Kernel, Ndm, Normalisation};
+pub use ndm::{Ndm, NdmKernel, NdmNormalisation};
 pub use phong::{Phong, PhongPeaks};
-pub use reflect::{FilteredTexel, Lit, Prepared};
+pub use reflect::{FilteredTexel, IncidentLight, PreparedBrdf};
 pub use sh::{Coefficients, Sh};
 pub use slopes::{SlopeGaussian, SlopeMoments, Slopes};
-pub use toksvig::{Lobe, Toksvig};
+pub use toksvig::{MeanLobe, Toksvig};
 pub use vmf::{Vmf, VmfMixture};
 
 use std::fmt::Debug;
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
-use crate::brdf::{Brdf, Lambert};
+use crate::brdf::{Brdf, Lambert, Lobe};
 use crate::fit::{Fit, Four};
-use crate::reflection::Reflection;
 use crate::shader::Shader;
 use crate::surface::SurfaceRow;
 use crate::units::SlopeVariance;
@@ -97,10 +96,10 @@ pub trait Representation: Debug + Send + Sync {
     fn decode(&self, sums: &Self::Sums) -> Self::Lobes;
 
     /// The effective lobe `w ↦ ∫ f(w·n) gamma(n) dn` under this distribution.
-    fn effective<'a>(&'a self, lobes: &Self::Lobes, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a>;
+    fn effective<'a>(&'a self, lobes: &Self::Lobes, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a>;
 
     /// What [`Self::effective_with`] wants to know of a lobe, the same for all texels.
-    fn table(&self, _brdf: &dyn Brdf) -> Vec<f64> {
+    fn table(&self, _brdf: &dyn Lobe) -> Vec<f64> {
         Vec::new()
     }
 
@@ -108,17 +107,17 @@ pub trait Representation: Debug + Send + Sync {
     fn effective_with<'a>(
         &'a self,
         lobes: &Self::Lobes,
-        brdf: &'a dyn Brdf,
+        lobe: &'a dyn Lobe,
         _table: &'a [f64],
     ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        self.effective(lobes, brdf)
+        self.effective(lobes, lobe)
     }
 
     /// The mean normal, whose length says how far the normals stray.
     fn mean(&self, lobes: &Self::Lobes) -> DVec3;
 
     /// The distribution as a sum of isotropic lobes, and the cosine that they are a function of, where it is one.
-    fn isotropic(&self, _lobes: &Self::Lobes) -> Option<(Cosine, Vec<Shaded>)> {
+    fn isotropic(&self, _lobes: &Self::Lobes) -> Option<(Cosine, Vec<NormalLobe>)> {
         None
     }
 
@@ -148,7 +147,7 @@ pub trait Representation: Debug + Send + Sync {
         true
     }
 
-    /// True when [`Self::finish`] does something.
+    /// True when [`Self::params`] does something.
     fn has_finish(&self) -> bool {
         false
     }
@@ -170,15 +169,15 @@ pub trait Representation: Debug + Send + Sync {
     }
 
     /// An evaluator for one lobe and one set of directions, which may hold tables for them.
-    fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a>
+    fn evaluator<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a>
     where
         Self: Sized,
     {
-        Box::new(OneByOne { representation: self, brdf, directions })
+        Box::new(OneByOne { representation: self, lobe, directions })
     }
 
     /// How the flat map's effective lobe differs from the lobe itself, when it does.
-    fn flat_lobe(&self, _brdf: &dyn Brdf) -> FlatLobe {
+    fn flat_lobe(&self, _brdf: &dyn Lobe) -> FlatLobe {
         FlatLobe::Exact
     }
 }
@@ -259,14 +258,14 @@ pub trait Evaluator: Send + Sync {
 
 struct OneByOne<'a, R> {
     representation: &'a R,
-    brdf: &'a dyn Brdf,
+    lobe: &'a dyn Lobe,
     directions: &'a [DVec3],
 }
 
 impl<R: Representation> Evaluator for OneByOne<'_, R> {
     fn evaluate(&self, channels: &[f32], out: &mut [f64]) {
         let lobes = self.representation.decode(&self.representation.unpack(channels));
-        let effective = self.representation.effective(&lobes, self.brdf);
+        let effective = self.representation.effective(&lobes, self.lobe);
         for (out, w) in out.iter_mut().zip(self.directions) {
             *out = effective(*w);
         }
@@ -297,36 +296,31 @@ pub trait Method: Debug + Send + Sync {
     fn mean_normal(&self, channels: &[f32]) -> DVec3;
 
     /// An evaluator for one BRDF at fixed directions.
-    fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a>;
+    fn evaluator<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a>;
 
     /// What shading wants to know of a material, the same for all its texels.
-    fn prepare(&self, reflection: &Reflection, gloss: SlopeVariance) -> Prepared;
+    fn prepare(&self, brdf: &Brdf, roughness: SlopeVariance) -> PreparedBrdf;
 
     /// The light that a texel with these filtered channels sends to the eye; see [`FilteredTexel`].
-    fn reflect(&self, texel: &FilteredTexel<'_>, reflection: &Reflection, lights: &[Lit]) -> DVec3;
+    fn reflect(&self, texel: &FilteredTexel<'_>, brdf: &Brdf, lights: &[IncidentLight]) -> DVec3;
 
     /// The light that it sends to the eye of an environment, but for its small bright sources.
     fn reflect_environment(
         &self,
         texel: &FilteredTexel<'_>,
-        reflection: &Reflection,
-        surround: &Surround<'_>,
+        brdf: &Brdf,
+        local: &LocalEnvironment<'_>,
     ) -> DVec3;
 
-    /// What shading wants to know of a material whose gloss goes from `least` to `most`, as shaders take it: entry by entry, at the eleven
-    /// glosses `least + (k/10)² (most - least)`, and then of the diffuse lobe.
-    fn shader_table(
-        &self,
-        reflection: &Reflection,
-        least: SlopeVariance,
-        most: SlopeVariance,
-    ) -> Vec<[f32; 12]>;
+    /// What shading wants to know of a material whose roughness goes from `least` to `most`, as shaders take it: entry by entry, at the eleven
+    /// roughnesses `least + (k/10)² (most - least)`, and then of the diffuse lobe.
+    fn shader_table(&self, brdf: &Brdf, least: SlopeVariance, most: SlopeVariance) -> Vec<[f32; 12]>;
 
     /// The twin of decoding and shading, in WGSL; see `crates/core/src/shader.rs` for how it is linked.
     fn shader(&self) -> Shader;
 
     /// What it makes of a flat map.
-    fn flat_lobe(&self, brdf: &dyn Brdf) -> FlatLobe;
+    fn flat_lobe(&self, lobe: &dyn Lobe) -> FlatLobe;
 
     /// What is to be fitted; `None` for a method whose sums come straight from the fine normals.
     fn fit(&self) -> Option<Fit>;
@@ -381,47 +375,42 @@ impl<R: Representation> Method for R {
         self.mean(&self.decode(&self.unpack(channels)))
     }
 
-    fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
-        Representation::evaluator(self, brdf, directions)
+    fn evaluator<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
+        Representation::evaluator(self, lobe, directions)
     }
 
-    fn prepare(&self, reflection: &Reflection, gloss: SlopeVariance) -> Prepared {
-        let lobe = reflection.lobe.widen(gloss);
+    fn prepare(&self, brdf: &Brdf, roughness: SlopeVariance) -> PreparedBrdf {
+        let lobe = brdf.lobe.widen(roughness);
         let tables = [self.table(&*lobe), self.table(&Lambert::SHARP)];
-        Prepared { gloss, lobe, tables }
+        PreparedBrdf { roughness, lobe, tables }
     }
 
-    fn reflect(&self, texel: &FilteredTexel<'_>, reflection: &Reflection, lights: &[Lit]) -> DVec3 {
-        reflect::reflect(self, texel, reflection, lights)
+    fn reflect(&self, texel: &FilteredTexel<'_>, brdf: &Brdf, lights: &[IncidentLight]) -> DVec3 {
+        reflect::reflect(self, texel, brdf, lights)
     }
 
     fn reflect_environment(
         &self,
         texel: &FilteredTexel<'_>,
-        reflection: &Reflection,
-        surround: &Surround<'_>,
+        brdf: &Brdf,
+        local: &LocalEnvironment<'_>,
     ) -> DVec3 {
-        environment::reflect(self, texel, reflection, surround)
+        environment::reflect(self, texel, brdf, local)
     }
 
-    fn shader_table(
-        &self,
-        reflection: &Reflection,
-        least: SlopeVariance,
-        most: SlopeVariance,
-    ) -> Vec<[f32; 12]> {
+    fn shader_table(&self, brdf: &Brdf, least: SlopeVariance, most: SlopeVariance) -> Vec<[f32; 12]> {
         let mut entries = vec![[0.0; 12]; Representation::shader(self).table];
         let mut set = |k: usize, table: Vec<f64>| {
             entries.iter_mut().zip(table).for_each(|(entry, value)| entry[k] = value as f32);
         };
         let span = most.get() - least.get();
         for k in 0..11 {
-            // All alike where there is but one gloss.
+            // All alike where there is but one roughness.
             if k > 0 && span <= 0.0 {
                 break;
             }
             let t = k as f64 / 10.0;
-            set(k, self.table(&*reflection.lobe.widen(least.widen(SlopeVariance::clamped(span * t * t)))));
+            set(k, self.table(&*brdf.lobe.widen(least.widen(SlopeVariance::clamped(span * t * t)))));
         }
         set(11, self.table(&Lambert::SHARP));
         entries
@@ -431,8 +420,8 @@ impl<R: Representation> Method for R {
         Representation::shader(self)
     }
 
-    fn flat_lobe(&self, brdf: &dyn Brdf) -> FlatLobe {
-        Representation::flat_lobe(self, brdf)
+    fn flat_lobe(&self, lobe: &dyn Lobe) -> FlatLobe {
+        Representation::flat_lobe(self, lobe)
     }
 
     fn fit(&self) -> Option<Fit> {

@@ -5,9 +5,9 @@
 
 use glam::{DVec3, Vec3};
 
-use super::mixture::{Cosine, Shaded, cosine};
+use super::mixture::{Cosine, NormalLobe, cosine};
 use super::{Decoded, Representation, Row, Sample, direction_or_up, no_parameters};
-use crate::brdf::Brdf;
+use crate::brdf::Lobe;
 use crate::shader::Shader;
 use crate::units::SlopeVariance;
 
@@ -37,14 +37,14 @@ impl UnitMean {
     }
 
     /// The direction as a lobe without spread.
-    pub(super) fn alone(&self) -> Shaded {
-        Shaded::alone(self.direction, SlopeVariance::ZERO)
+    pub(super) fn alone(&self) -> NormalLobe {
+        NormalLobe::alone(self.direction, SlopeVariance::ZERO)
     }
 
     /// The lobe itself, around the direction.
-    pub(super) fn effective<'a>(&self, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+    pub(super) fn effective<'a>(&self, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         let n = self.direction;
-        Box::new(move |w| brdf.evaluate(w.dot(n)))
+        Box::new(move |w| lobe.evaluate(w.dot(n)))
     }
 }
 
@@ -94,8 +94,8 @@ impl Representation for Naive {
         lobes.alone().mean
     }
 
-    fn effective<'a>(&'a self, lobes: &UnitMean, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        lobes.effective(brdf)
+    fn effective<'a>(&'a self, lobes: &UnitMean, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+        lobes.effective(lobe)
     }
 
     fn shader(&self) -> Shader {
@@ -106,7 +106,7 @@ impl Representation for Naive {
         ])
     }
 
-    fn isotropic(&self, lobes: &UnitMean) -> Option<(Cosine, Vec<Shaded>)> {
+    fn isotropic(&self, lobes: &UnitMean) -> Option<(Cosine, Vec<NormalLobe>)> {
         Some((cosine, vec![lobes.alone()]))
     }
 }

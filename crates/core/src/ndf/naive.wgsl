@@ -2,6 +2,6 @@
 
 const NORMALISED: bool = false;
 
-fn decode_lobe(sums: vec4<f32>) -> Shaded {
-    return Shaded(direction_or_up(sums.xyz), 1.0, 0.0);
+fn decode_lobe(sums: vec4<f32>) -> NormalLobe {
+    return NormalLobe(direction_or_up(sums.xyz), 1.0, 0.0);
 }

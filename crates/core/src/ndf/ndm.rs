@@ -1,9 +1,9 @@
 //! `ndm`: normal distribution mapping, a 3-D Gaussian restricted to the sphere. Olano and North 1997.
 //!
-//! Mean and covariance of the normals; the base gloss is an initial covariance `v I`, v the lobe's slope
+//! Mean and covariance of the normals; the base roughness is an initial covariance `v I`, v the lobe's slope
 //! variance, which around a unit mean restricts to a vMF lobe of kappa = 1/v. Density
-//! `k / sqrt|Σ| g(d)`, `d = (w-mu)ᵀ Σ⁻¹ (w-mu)` (their section 6), with three kernels `g` ([`Kernel`]) and
-//! three normalisations ([`Normalisation`]). `k` is one constant for a material: what makes the lobe of a
+//! `k / sqrt|Σ| g(d)`, `d = (w-mu)ᵀ Σ⁻¹ (w-mu)` (their section 6), with three kernels `g` ([`NdmKernel`]) and
+//! three normalisations ([`NdmNormalisation`]). `k` is one constant for a material: what makes the lobe of a
 //! flat map hold the BRDF's energy `rho_0`.
 //!
 //! Stored are the moments about the pole, of `n - (0,0,1)`: as linear as those about the origin, the
@@ -17,17 +17,17 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::slopes::stretched;
 use super::{Decoded, FlatLobe, Method, Representation, Row, Sample, direction_or_up};
-use crate::brdf::{Brdf, mean_of_positive_part};
+use crate::brdf::{Lobe, mean_of_positive_part};
 use crate::shader::Shader;
 use crate::sphere::frame;
 use crate::units::SlopeVariance;
 
 /// The generator `g(d)` of the elliptically contoured density.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kernel {
+pub enum NdmKernel {
     /// The BRDF's own profile, `g(d) = f(1 - v d/2) / f(1)`; ours. A flat map gives back the BRDF, and
     /// Blinn-Phong of exponent m is Pearson II of the same m.
-    Brdf,
+    Profile,
     /// `e^{-d/2}`.
     Gaussian,
     /// Pearson type II, `max(0, 1 - d/(2m))^m`, m = 8 (the stored text of the paper garbles `2m`).
@@ -36,11 +36,11 @@ pub enum Kernel {
 
 /// How the density is made to integrate to one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Normalisation {
+pub enum NdmNormalisation {
     /// `1/sqrt|Σ|` and no more: the paper's own pictures.
     Partial,
     /// Times a factor found by integrating over the sphere when baking, stored in the spare channels
-    /// for three glosses and interpolated between them, as between texels.
+    /// for three roughnesses and interpolated between them, as between texels.
     Integrated,
     /// Replaced by the 2-D Gaussian on the plane through the mean, projected to the sphere.
     Plane,
@@ -49,8 +49,8 @@ pub enum Normalisation {
 /// Normal distribution mapping.
 #[derive(Clone, Copy, Debug)]
 pub struct Ndm {
-    kernel: Kernel,
-    normalisation: Normalisation,
+    kernel: NdmKernel,
+    normalisation: NdmNormalisation,
 }
 
 pub(super) const ROW: Row = Row {
@@ -76,12 +76,12 @@ fn parse(words: &[&str]) -> Result<Box<dyn Method>, String> {
     let (mut kernel, mut normalisation) = (None, None);
     for word in words {
         let named_before = match *word {
-            "brdf" => kernel.replace(Kernel::Brdf).is_some(),
-            "gaussian" => kernel.replace(Kernel::Gaussian).is_some(),
-            "pearson" => kernel.replace(Kernel::Pearson).is_some(),
-            "partial" => normalisation.replace(Normalisation::Partial).is_some(),
-            "integrated" => normalisation.replace(Normalisation::Integrated).is_some(),
-            "plane" => normalisation.replace(Normalisation::Plane).is_some(),
+            "brdf" => kernel.replace(NdmKernel::Profile).is_some(),
+            "gaussian" => kernel.replace(NdmKernel::Gaussian).is_some(),
+            "pearson" => kernel.replace(NdmKernel::Pearson).is_some(),
+            "partial" => normalisation.replace(NdmNormalisation::Partial).is_some(),
+            "integrated" => normalisation.replace(NdmNormalisation::Integrated).is_some(),
+            "plane" => normalisation.replace(NdmNormalisation::Plane).is_some(),
             other => {
                 return Err(format!(
                     "`{other}` is no kernel (brdf, gaussian, pearson) and no normalisation (partial, integrated, plane)"
@@ -93,10 +93,10 @@ fn parse(words: &[&str]) -> Result<Box<dyn Method>, String> {
         }
     }
     let ndm = Ndm {
-        kernel: kernel.unwrap_or(Kernel::Brdf),
-        normalisation: normalisation.unwrap_or(Normalisation::Partial),
+        kernel: kernel.unwrap_or(NdmKernel::Profile),
+        normalisation: normalisation.unwrap_or(NdmNormalisation::Partial),
     };
-    if ndm.kernel == Kernel::Brdf && ndm.normalisation == Normalisation::Integrated {
+    if ndm.kernel == NdmKernel::Profile && ndm.normalisation == NdmNormalisation::Integrated {
         return Err(
             "factors are integrated before the BRDF is known: name `gaussian` or `pearson`".to_owned()
         );
@@ -111,11 +111,11 @@ pub struct PoleMoments {
     mean: [f32; 3],
     /// `E[p pᵀ]`: xx, yy, zz, xy, xz, yz.
     second: [f32; 6],
-    /// For the glosses of [`FACTOR_VARIANCES`]; 1 unless integrated.
+    /// For the roughnesses of [`FACTOR_VARIANCES`]; 1 unless integrated.
     factors: [f32; 3],
 }
 
-/// A Gaussian in space, before the base gloss is added.
+/// A Gaussian in space, before the base roughness is added.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpaceGaussian {
     mean: DVec3,
@@ -129,22 +129,22 @@ impl From<SpaceGaussian> for Decoded {
     }
 }
 
-/// Base glosses (slope variances) for which factors are stored: exponents 8, 128 and 2048.
+/// Base roughnesses (slope variances) for which factors are stored: exponents 8, 128 and 2048.
 const FACTOR_VARIANCES: [f64; 3] = [1.0 / 8.0, 1.0 / 128.0, 1.0 / 2048.0];
 
 /// `m` of the Pearson kernel; the paper used eight.
 const PEARSON_M: f64 = 8.0;
 
-impl Kernel {
-    /// `g(d)`; not for [`Kernel::Brdf`], which has no shape of its own.
+impl NdmKernel {
+    /// `g(d)`; not for [`NdmKernel::Profile`], which has no shape of its own.
     fn generator(self, d: f64) -> f64 {
         match self {
             Self::Pearson => (1.0 - d / (2.0 * PEARSON_M)).max(0.0).powf(PEARSON_M),
-            Self::Gaussian | Self::Brdf => (-d / 2.0).exp(),
+            Self::Gaussian | Self::Profile => (-d / 2.0).exp(),
         }
     }
 
-    /// `∫ g` over the sphere for a flat map of gloss `v`, where d = 2 (1-u) / v: closed forms.
+    /// `∫ g` over the sphere for a flat map of roughness `v`, where d = 2 (1-u) / v: closed forms.
     fn flat_integral(self, v: f64) -> f64 {
         match self {
             Self::Pearson => {
@@ -152,7 +152,7 @@ impl Kernel {
                 let behind = (1.0 - 2.0 / reach).max(0.0).powf(PEARSON_M + 1.0);
                 2.0 * PI * reach / (PEARSON_M + 1.0) * (1.0 - behind)
             }
-            Self::Gaussian | Self::Brdf => 2.0 * PI * v * -(-2.0 / v).exp_m1(),
+            Self::Gaussian | Self::Profile => 2.0 * PI * v * -(-2.0 / v).exp_m1(),
         }
     }
 
@@ -160,7 +160,7 @@ impl Kernel {
     fn plane_integral(self) -> f64 {
         match self {
             Self::Pearson => 2.0 * PI * PEARSON_M / (PEARSON_M + 1.0),
-            Self::Gaussian | Self::Brdf => 2.0 * PI,
+            Self::Gaussian | Self::Profile => 2.0 * PI,
         }
     }
 }
@@ -173,16 +173,16 @@ impl SpaceGaussian {
         (mu, a, b)
     }
 
-    /// The covariance with the base gloss `v` added.
+    /// The covariance with the base roughness `v` added.
     fn widened(&self, v: f64) -> DMat3 {
         with_pivots_above(self.covariance + DMat3::from_diagonal(DVec3::splat(v)), v)
     }
 
-    /// `∫ g(d) / sqrt|Σ|` over the sphere, divided by the same for a flat map of gloss `v`.
+    /// `∫ g(d) / sqrt|Σ|` over the sphere, divided by the same for a flat map of roughness `v`.
     ///
     /// Midpoint rule in two angles, `w = (sin a, cos a sin b, cos a cos b)` with a along the narrower tangent
     /// axis: spacing 0.8 of the narrowest scale, where the rule's error for a Gaussian is e^{-2 pi²/0.64}.
-    fn relative_integral(&self, kernel: Kernel, v: f64) -> f64 {
+    fn relative_integral(&self, kernel: NdmKernel, v: f64) -> f64 {
         let sigma = self.widened(v);
         let (mu, a, b) = self.axes();
         let [aa, bb, ab] = [a.dot(sigma * a), b.dot(sigma * b), a.dot(sigma * b)];
@@ -211,7 +211,7 @@ impl SpaceGaussian {
         integral / determinant.sqrt() / (kernel.flat_integral(v) / v.powf(1.5))
     }
 
-    /// The stored factors at gloss `v`: the parabola through them in log-log, and beyond the glosses
+    /// The stored factors at roughness `v`: the parabola through them in log-log, and beyond the roughnesses
     /// that have one its value at the nearer end.
     fn factor(&self, v: f64) -> f64 {
         let x = FACTOR_VARIANCES.map(f64::ln);
@@ -228,7 +228,7 @@ impl SpaceGaussian {
 /// The matrix `L D Lᵀ` of a symmetric one, with the pivots held at `floor` or above.
 ///
 /// A covariance plus `floor` times the identity has no pivot below `floor`. Rounding of the stored moments can
-/// make the covariance indefinite, which a sharp lobe's small gloss does not mend; this does, and leaves
+/// make the covariance indefinite, which a sharp lobe's small roughness does not mend; this does, and leaves
 /// every sound matrix as it is. x and y come first: their moments are the well-conditioned ones.
 fn with_pivots_above(m: DMat3, floor: f64) -> DMat3 {
     let d0 = m.x_axis.x.max(floor);
@@ -247,14 +247,14 @@ impl Representation for Ndm {
 
     fn spelling(&self) -> String {
         let kernel = match self.kernel {
-            Kernel::Brdf => "",
-            Kernel::Gaussian => ":gaussian",
-            Kernel::Pearson => ":pearson",
+            NdmKernel::Profile => "",
+            NdmKernel::Gaussian => ":gaussian",
+            NdmKernel::Pearson => ":pearson",
         };
         let normalisation = match self.normalisation {
-            Normalisation::Partial => "",
-            Normalisation::Integrated => ":integrated",
-            Normalisation::Plane => ":plane",
+            NdmNormalisation::Partial => "",
+            NdmNormalisation::Integrated => ":integrated",
+            NdmNormalisation::Plane => ":plane",
         };
         format!("{}{kernel}{normalisation}", ROW.name)
     }
@@ -336,32 +336,32 @@ impl Representation for Ndm {
     }
 
     /// The lobe's energy, which kernels of their own shape are scaled to.
-    fn table(&self, brdf: &dyn Brdf) -> Vec<f64> {
-        let own = self.kernel != Kernel::Brdf && brdf.slope_variance().is_some();
-        if own { brdf.zonal(0) } else { Vec::new() }
+    fn table(&self, lobe: &dyn Lobe) -> Vec<f64> {
+        let own = self.kernel != NdmKernel::Profile && lobe.slope_variance().is_some();
+        if own { lobe.zonal(0) } else { Vec::new() }
     }
 
-    fn effective<'a>(&'a self, lobes: &SpaceGaussian, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        self.effective_of(*lobes, brdf, self.table(brdf).first().copied())
+    fn effective<'a>(&'a self, lobes: &SpaceGaussian, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+        self.effective_of(*lobes, lobe, self.table(lobe).first().copied())
     }
 
     fn effective_with<'a>(
         &'a self,
         lobes: &SpaceGaussian,
-        brdf: &'a dyn Brdf,
+        lobe: &'a dyn Lobe,
         table: &'a [f64],
     ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        self.effective_of(*lobes, brdf, table.first().copied())
+        self.effective_of(*lobes, lobe, table.first().copied())
     }
 
     fn has_finish(&self) -> bool {
-        self.normalisation == Normalisation::Integrated
+        self.normalisation == NdmNormalisation::Integrated
     }
 
     fn finish(&self, channels: &mut [f32]) {
         let mut sums = self.unpack(channels);
         let gaussian = self.decode(&sums);
-        // Less spread than this changes no factor by more than 1e-5, at any gloss that has one.
+        // Less spread than this changes no factor by more than 1e-5, at any roughness that has one.
         let spread: f64 = (0..3).map(|i| gaussian.covariance.col(i)[i]).sum();
         if spread > 1e-9 || gaussian.mean.distance(direction_or_up(gaussian.mean)) > 1e-6 {
             for (factor, v) in sums.factors.iter_mut().zip(FACTOR_VARIANCES) {
@@ -371,8 +371,8 @@ impl Representation for Ndm {
         self.pack(&sums, channels);
     }
 
-    fn flat_lobe(&self, _brdf: &dyn Brdf) -> FlatLobe {
-        if self.kernel == Kernel::Brdf { FlatLobe::Exact } else { FlatLobe::OwnKernel }
+    fn flat_lobe(&self, _brdf: &dyn Lobe) -> FlatLobe {
+        if self.kernel == NdmKernel::Profile { FlatLobe::Exact } else { FlatLobe::OwnKernel }
     }
 }
 
@@ -381,17 +381,17 @@ impl Ndm {
     fn effective_of<'a>(
         self,
         g: SpaceGaussian,
-        brdf: &'a dyn Brdf,
+        lobe: &'a dyn Lobe,
         energy: Option<f64>,
     ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        let Some(base) = brdf.slope_variance() else {
+        let Some(base) = lobe.slope_variance() else {
             return Box::new(move |w| mean_of_positive_part(w.dot(g.mean), w.dot(g.covariance * w)));
         };
         let energy = energy.unwrap_or(1.0);
-        if self.normalisation == Normalisation::Plane {
-            self.on_plane(g, brdf, base, energy)
+        if self.normalisation == NdmNormalisation::Plane {
+            self.on_plane(g, lobe, base, energy)
         } else {
-            self.on_sphere(g, brdf, base, energy)
+            self.on_sphere(g, lobe, base, energy)
         }
     }
 
@@ -399,18 +399,18 @@ impl Ndm {
     fn on_sphere<'a>(
         self,
         g: SpaceGaussian,
-        brdf: &'a dyn Brdf,
+        lobe: &'a dyn Lobe,
         base: SlopeVariance,
         energy: f64,
     ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         let v = base.get();
         let sigma = g.widened(v);
         let inverse = sigma.inverse();
-        let factor = if self.normalisation == Normalisation::Integrated { g.factor(v) } else { 1.0 };
+        let factor = if self.normalisation == NdmNormalisation::Integrated { g.factor(v) } else { 1.0 };
         let scale = factor * (v.powi(3) / sigma.determinant().max(f64::MIN_POSITIVE)).sqrt();
         let distance = move |w: DVec3| (w - g.mean).dot(inverse * (w - g.mean)).max(0.0);
         match self.kernel {
-            Kernel::Brdf => Box::new(move |w| scale * brdf.evaluate(1.0 - v * distance(w) / 2.0)),
+            NdmKernel::Profile => Box::new(move |w| scale * lobe.evaluate(1.0 - v * distance(w) / 2.0)),
             kernel => {
                 let scale = scale * energy / kernel.flat_integral(v);
                 Box::new(move |w| scale * kernel.generator(distance(w)))
@@ -422,7 +422,7 @@ impl Ndm {
     fn on_plane<'a>(
         self,
         g: SpaceGaussian,
-        brdf: &'a dyn Brdf,
+        lobe: &'a dyn Lobe,
         base: SlopeVariance,
         energy: f64,
     ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
@@ -437,8 +437,8 @@ impl Ndm {
             a.dot(sigma * b) - sa * sb / along,
         ];
         let place = move |w: DVec3| (w.dot(mu), DVec2::new(w.dot(a), w.dot(b)) * length);
-        if self.kernel == Kernel::Brdf {
-            let p22 = stretched(brdf, base, covariance);
+        if self.kernel == NdmKernel::Profile {
+            let p22 = stretched(lobe, base, covariance);
             return Box::new(move |w| match place(w) {
                 (u, d) if u > 0.0 => p22(d / u) * length * length / u.powi(3),
                 _ => 0.0,
@@ -497,19 +497,19 @@ mod tests {
 
     #[test]
     fn integrated_factors_make_the_density_integrate_to_one() {
-        for kernel in [Kernel::Gaussian, Kernel::Pearson] {
-            let ndm = Ndm { kernel, normalisation: Normalisation::Integrated };
+        for kernel in [NdmKernel::Gaussian, NdmKernel::Pearson] {
+            let ndm = Ndm { kernel, normalisation: NdmNormalisation::Integrated };
             let mut channels = [0.0; 12];
             ndm.pack(&sums_of(ndm, &groove()), &mut channels);
             ndm.finish(&mut channels);
             let g = ndm.decode(&ndm.unpack(&channels));
-            // At a gloss with a stored factor, only the factor's single precision and the 400×400 check
+            // At a roughness with a stored factor, only the factor's single precision and the 400×400 check
             // are left; midway between two of them the parabola is off by up to 6 % on so extreme a pair.
             for (s, tolerance) in
                 [("blinn-phong:8", 1e-4), ("blinn-phong:128", 1e-4), ("blinn-phong:32", 0.06)]
             {
-                let brdf = brdf::parse(s).unwrap();
-                let effective = ndm.effective(&g, &*brdf);
+                let lobe = brdf::parse(s).unwrap();
+                let effective = ndm.effective(&g, &*lobe);
                 let total = integral(&effective);
                 assert!((total - 1.0).abs() < tolerance, "{kernel:?} {s}: {total}");
             }
@@ -518,18 +518,18 @@ mod tests {
 
     #[test]
     fn partial_normalisation_is_not_one_and_says_so() {
-        let ndm = Ndm { kernel: Kernel::Gaussian, normalisation: Normalisation::Partial };
+        let ndm = Ndm { kernel: NdmKernel::Gaussian, normalisation: NdmNormalisation::Partial };
         let g = ndm.decode(&sums_of(ndm, &groove()));
-        let brdf = brdf::parse("blinn-phong:128").unwrap();
-        let total = integral(&ndm.effective(&g, &*brdf));
+        let lobe = brdf::parse("blinn-phong:128").unwrap();
+        let total = integral(&ndm.effective(&g, &*lobe));
         assert!((total - 1.0).abs() > 0.02, "{total}");
     }
 
     #[test]
     fn blinn_phong_is_pearson_ii() {
         let bp = brdf::parse("blinn-phong:8").unwrap();
-        let [own, pearson] = [Kernel::Brdf, Kernel::Pearson]
-            .map(|kernel| Ndm { kernel, normalisation: Normalisation::Partial });
+        let [own, pearson] = [NdmKernel::Profile, NdmKernel::Pearson]
+            .map(|kernel| Ndm { kernel, normalisation: NdmNormalisation::Partial });
         let g = own.decode(&sums_of(own, &groove()));
         let w = DVec3::new(0.3, 0.2, 0.9).normalize();
         let (a, b) = (own.effective(&g, &*bp)(w), pearson.effective(&g, &*bp)(w));
@@ -544,7 +544,7 @@ mod tests {
         let normals: Vec<Vec3> = (0..64)
             .map(|i| Vec3::new(0.02 * (i as f32).sin(), 0.03 * (1.7 * i as f32).cos(), 1.0).normalize())
             .collect();
-        let ndm = Ndm { kernel: Kernel::Gaussian, normalisation: Normalisation::Partial };
+        let ndm = Ndm { kernel: NdmKernel::Gaussian, normalisation: NdmNormalisation::Partial };
         let sums = sums_of(ndm, &normals);
         let exact = ndm.decode(&sums).covariance;
         let half = |values: &[f32]| {

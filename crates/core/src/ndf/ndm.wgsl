@@ -16,7 +16,7 @@ struct Decoded {
     // Covariance: xx, yy, zz, and xy, xz, yz.
     squares: vec3<f32>,
     products: vec3<f32>,
-    // Normalisation factors for glosses of exponents 8, 128 and 2048.
+    // Normalisation factors for roughnesses of exponents 8, 128 and 2048.
     factors: vec3<f32>,
 }
 
@@ -77,7 +77,7 @@ fn generator(d: f32) -> f32 {
     return exp(-d / 2.0);
 }
 
-// The generator's integral over the sphere, for a flat map of gloss `v`.
+// The generator's integral over the sphere, for a flat map of roughness `v`.
 fn flat_integral(v: f32) -> f32 {
     if KERNEL == PEARSON {
         let reach = PEARSON_M * v;
@@ -93,7 +93,7 @@ fn plane_integral() -> f32 {
     return select(2.0 * PI, 2.0 * PI * PEARSON_M / (PEARSON_M + 1.0), KERNEL == PEARSON);
 }
 
-// The stored factors at gloss `v`: the parabola through them in log-log, held to its ends.
+// The stored factors at roughness `v`: the parabola through them in log-log, held to its ends.
 fn stored_factor(factors: vec3<f32>, v: f32) -> f32 {
     let x = log(vec3<f32>(1.0 / 8.0, 1.0 / 128.0, 1.0 / 2048.0));
     let y = log(max(factors, vec3<f32>(1e-6)));
@@ -106,7 +106,7 @@ fn stored_factor(factors: vec3<f32>, v: f32) -> f32 {
 
 // The density on the sphere.
 fn on_sphere(g: ptr<function, Decoded>, base: f32, energy: f32, w: vec3<f32>) -> f32 {
-    let v = brdf_variance(base);
+    let v = lobe_variance(base);
     let p = with_pivots_above(g, v);
     let d = distance_from(p, w - (*g).mean);
     var scale = sqrt((v / p.d.x) * (v / p.d.y) * (v / p.d.z));
@@ -114,7 +114,7 @@ fn on_sphere(g: ptr<function, Decoded>, base: f32, energy: f32, w: vec3<f32>) ->
         scale *= stored_factor((*g).factors, v);
     }
     if KERNEL == BRDF_KERNEL {
-        return scale * brdf_evaluate(base, 1.0 - v * d / 2.0);
+        return scale * lobe_evaluate(base, 1.0 - v * d / 2.0);
     }
     return scale * energy / flat_integral(v) * generator(d);
 }
@@ -128,7 +128,7 @@ fn on_plane(g: ptr<function, Decoded>, base: f32, energy: f32, w: vec3<f32>) -> 
     }
     let axes = frame(mu);
     let short = clamp(length((*g).mean), 1e-3, 1.0);
-    let p = with_pivots_above(g, brdf_variance(base));
+    let p = with_pivots_above(g, lobe_variance(base));
     let a = across(p, axes.a);
     let b = across(p, axes.b);
     let m = across(p, mu);
@@ -151,17 +151,17 @@ fn on_plane(g: ptr<function, Decoded>, base: f32, energy: f32, w: vec3<f32>) -> 
     return energy * onto / (plane_integral() * sqrt(determinant)) * generator(far / determinant);
 }
 
-fn effective(g: ptr<function, Decoded>, reflection: Reflection, gloss: f32, w: vec3<f32>) -> f32 {
-    let base = brdf_widen(reflection.base, gloss);
-    var table = reflection.table;
-    let energy = tabulated(&table, vec2<f32>(reflection.gloss, reflection.span), 0u, gloss, 0.0);
+fn effective(g: ptr<function, Decoded>, brdf: Brdf, roughness: f32, w: vec3<f32>) -> f32 {
+    let base = lobe_widen(brdf.base, roughness);
+    var table = brdf.table;
+    let energy = tabulated(&table, vec2<f32>(brdf.roughness, brdf.span), 0u, roughness, 0.0);
     if NORMALISATION == PLANE {
         return on_plane(g, base, energy, w);
     }
     return on_sphere(g, base, energy, w);
 }
 
-fn effective_diffuse(g: ptr<function, Decoded>, reflection: Reflection, w: vec3<f32>) -> f32 {
+fn effective_diffuse(g: ptr<function, Decoded>, brdf: Brdf, w: vec3<f32>) -> f32 {
     let squares = dot((*g).squares, w * w);
     let products = dot((*g).products, w.xxy * w.yzz);
     return mean_of_positive_part(dot(w, (*g).mean), squares + 2.0 * products);

@@ -1,13 +1,13 @@
 //! `phong:J`: a few Phong peaks a texel, by non-linear least squares. Fournier 1992; a baseline in Tan et al. 2005.
 //!
 //! A peak holds its weight, direction and exponent. None of these mixes: a filter shades every peak of every texel it
-//! reads, up to 8 J of them, and blends the results (`filtering.rs`). A peak of exponent s is the BRDF widened by `1/s`.
+//! reads, up to 8 J of them, and blends the results (`measure/between.rs`). A peak of exponent s is the BRDF widened by `1/s`.
 
 use glam::DVec3;
 
-use super::mixture::{Cosine, Lobes, MixtureEvaluator, Shaded, cosine, effective, mean_of};
+use super::mixture::{Cosine, LobeSums, MixtureEvaluator, NormalLobe, cosine, effective, mean_of};
 use super::{Decoded, Evaluator, Method, MixtureLobe, Representation, Row, Sample};
-use crate::brdf::Brdf;
+use crate::brdf::Lobe;
 use crate::fit::{Alignment, Fit, Four, LobeKind, MAX_LOBES, SHARPEST};
 use crate::shader::Shader;
 use crate::units::SlopeVariance;
@@ -42,12 +42,12 @@ fn parse(words: &[&str]) -> Result<Box<dyn Method>, String> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhongPeaks {
     /// Peaks of any weight.
-    pub peaks: Vec<Shaded>,
+    pub peaks: Vec<NormalLobe>,
 }
 
 impl From<PhongPeaks> for Decoded {
     fn from(peaks: PhongPeaks) -> Self {
-        let peak = |p: &Shaded| MixtureLobe {
+        let peak = |p: &NormalLobe| MixtureLobe {
             layer: p.layer,
             weight: p.weight,
             mean: p.mean,
@@ -58,7 +58,7 @@ impl From<PhongPeaks> for Decoded {
 }
 
 impl Phong {
-    fn peaks(sums: &Lobes) -> Vec<Shaded> {
+    fn peaks(sums: &LobeSums) -> Vec<NormalLobe> {
         let peak = |(layer, &[weight, x, y, exponent]): (usize, &Four)| {
             // Held to the disk and to exponents that mean something, whatever a damaged file holds.
             let (x, y) = (f64::from(x), f64::from(y));
@@ -67,14 +67,14 @@ impl Phong {
             let mean = DVec3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt());
             let variance =
                 if exponent < SHARPEST * 0.999 { 1.0 / f64::from(exponent.max(1e-2)) } else { 0.0 };
-            Shaded { layer, weight: f64::from(weight), mean, variance: SlopeVariance::clamped(variance) }
+            NormalLobe { layer, weight: f64::from(weight), mean, variance: SlopeVariance::clamped(variance) }
         };
         sums.alive().map(peak).collect()
     }
 }
 
 impl Representation for Phong {
-    type Sums = Lobes;
+    type Sums = LobeSums;
     type Lobes = PhongPeaks;
 
     fn spelling(&self) -> String {
@@ -89,28 +89,28 @@ impl Representation for Phong {
         "peaks"
     }
 
-    fn zero(&self) -> Lobes {
-        Lobes::zero(self.peaks)
+    fn zero(&self) -> LobeSums {
+        LobeSums::zero(self.peaks)
     }
 
     /// A normal is one sharp peak; several do not add up to anything.
-    fn accumulate(&self, sums: &mut Lobes, sample: &Sample, weight: f32) {
+    fn accumulate(&self, sums: &mut LobeSums, sample: &Sample, weight: f32) {
         sums.add(0, [1.0, sample.normal.x, sample.normal.y, SHARPEST], weight);
     }
 
-    fn blend(&self, sums: &mut Lobes, part: &Lobes, weight: f32) {
+    fn blend(&self, sums: &mut LobeSums, part: &LobeSums, weight: f32) {
         sums.blend(part, weight);
     }
 
-    fn pack(&self, sums: &Lobes, channels: &mut [f32]) {
+    fn pack(&self, sums: &LobeSums, channels: &mut [f32]) {
         sums.to_channels(channels);
     }
 
-    fn unpack(&self, channels: &[f32]) -> Lobes {
-        Lobes::from_channels(self.peaks, channels)
+    fn unpack(&self, channels: &[f32]) -> LobeSums {
+        LobeSums::from_channels(self.peaks, channels)
     }
 
-    fn decode(&self, sums: &Lobes) -> PhongPeaks {
+    fn decode(&self, sums: &LobeSums) -> PhongPeaks {
         PhongPeaks { peaks: Self::peaks(sums) }
     }
 
@@ -118,8 +118,8 @@ impl Representation for Phong {
         mean_of(&lobes.peaks)
     }
 
-    fn effective<'a>(&'a self, peaks: &PhongPeaks, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        effective(&peaks.peaks, brdf, cosine)
+    fn effective<'a>(&'a self, peaks: &PhongPeaks, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+        effective(&peaks.peaks, lobe, cosine)
     }
 
     fn shader(&self) -> Shader {
@@ -131,13 +131,13 @@ impl Representation for Phong {
         .constant("SHARPEST", SHARPEST)
     }
 
-    fn isotropic(&self, lobes: &PhongPeaks) -> Option<(Cosine, Vec<Shaded>)> {
+    fn isotropic(&self, lobes: &PhongPeaks) -> Option<(Cosine, Vec<NormalLobe>)> {
         Some((cosine, lobes.peaks.clone()))
     }
 
-    fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
+    fn evaluator<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
         let lobes = |channels: &[f32]| Self::peaks(&self.unpack(channels));
-        Box::new(MixtureEvaluator { lobes, cosine, brdf, directions })
+        Box::new(MixtureEvaluator { lobes, cosine, lobe, directions })
     }
 
     fn fit(&self) -> Option<Fit> {

@@ -1,6 +1,6 @@
 //! Shading a filtered texel: what its normals together send to the eye.
 //!
-//! The mean over normals of `f(wh·n) c(n)` (`reflection.rs`). f is the effective lobe's business. c varies slowly, and is
+//! The mean over normals of `f(wh·n) c(n)` (`brdf.rs`). f is the effective lobe's business. c varies slowly, and is
 //! taken at the normals that answer: those of lobe j that f picks, of mean `mu_j/v_j + wh/b`, b the variance of f, as for a
 //! product of two Gaussians. The papers take c at `mu_j`; for a lobe wider than f that is not where the light comes from.
 
@@ -8,26 +8,25 @@ use std::f64::consts::PI;
 
 use glam::{DMat2, DVec3};
 
-use super::{Representation, Shaded, direction_or_up, leadr};
-use crate::brdf::{Brdf, Lambert};
-use crate::reflection::{Finish, Reflection, Way};
+use super::{NormalLobe, Representation, direction_or_up, leadr};
+use crate::brdf::{Brdf, Directions, Lambert, Lobe, SurfaceParams};
 use crate::units::SlopeVariance;
 
 /// A light's way to the eye, and its irradiance on a plane that faces it, in linear RGB.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lit {
+pub struct IncidentLight {
     /// The way.
-    pub way: Way,
+    pub directions: Directions,
     /// The irradiance.
     pub irradiance: DVec3,
 }
 
 /// What shading wants to know of a material, made once by [`super::Method::prepare`].
-pub struct Prepared {
-    /// The gloss it is made for.
-    pub(super) gloss: SlopeVariance,
+pub struct PreparedBrdf {
+    /// The roughness it is made for.
+    pub(super) roughness: SlopeVariance,
     /// The lobe widened by it.
-    pub(super) lobe: Box<dyn Brdf>,
+    pub(super) lobe: Box<dyn Lobe>,
     /// The method's tables for that lobe and for the diffuse one.
     pub(super) tables: [Vec<f64>; 2],
 }
@@ -38,106 +37,106 @@ pub struct FilteredTexel<'a> {
     /// Channels as filtered, four a layer.
     pub channels: &'a [f32],
     /// What it is made of: in the layer of a lobe, or (`None`) over all.
-    pub finish: &'a dyn Fn(Option<usize>) -> Finish,
+    pub params: &'a dyn Fn(Option<usize>) -> SurfaceParams,
     /// What was prepared for the material.
-    pub prepared: &'a Prepared,
+    pub prepared: &'a PreparedBrdf,
     /// Shade as the papers print it: factors at the lobes' means; for displaced surfaces, the rational form of masking.
     pub at_means: bool,
     /// For a displaced surface, how slopes of the map lie on it; `None` for a normal map.
-    pub relief: Option<DMat2>,
+    pub slope_map: Option<DMat2>,
 }
 
 /// Light that a filtered texel sends to the eye.
 pub(super) fn reflect<R: Representation + ?Sized>(
     representation: &R,
     texel: &FilteredTexel<'_>,
-    reflection: &Reflection,
-    lights: &[Lit],
+    brdf: &Brdf,
+    lights: &[IncidentLight],
 ) -> DVec3 {
     let decoded = representation.decode(&representation.unpack(texel.channels));
-    if let (Some(by), Some((slopes, grid))) = (texel.relief, representation.displaced(&decoded)) {
-        return leadr::reflect((&slopes.stretched(by), grid), texel, reflection, lights);
+    if let (Some(by), Some((slopes, grid))) = (texel.slope_map, representation.displaced(&decoded)) {
+        return leadr::reflect((&slopes.stretched(by), grid), texel, brdf, lights);
     }
     let Some((cosine, lobes)) = representation.isotropic(&decoded) else {
-        let finish = (texel.finish)(None);
-        let Prepared { gloss, lobe, tables: [table, diffuse_table] } = texel.prepared;
-        // Where a gloss map says something else than what was prepared for, the lobe is made anew.
-        let own = (finish.gloss != *gloss).then(|| reflection.lobe.widen(finish.gloss));
+        let params = (texel.params)(None);
+        let PreparedBrdf { roughness, lobe, tables: [table, diffuse_table] } = texel.prepared;
+        // Where a roughness map says something else than what was prepared for, the lobe is made anew.
+        let own = (params.roughness != *roughness).then(|| brdf.lobe.widen(params.roughness));
         let lobe = match &own {
             Some(own) => representation.effective(&decoded, &**own),
             None => representation.effective_with(&decoded, &**lobe, table),
         };
         let diffuse = representation.effective_with(&decoded, &Lambert::SHARP, diffuse_table);
-        let width = reflection.width(finish.gloss);
+        let width = brdf.width(params.roughness);
         let mean = representation.mean(&decoded);
         let length = mean.length().clamp(1e-3, 1.0);
-        let whole = Shaded::alone(direction_or_up(mean), SlopeVariance::clamped((1.0 - length) / length));
-        let of = |light: &Lit| {
-            let specular = if reflection.is_specular() {
+        let whole = NormalLobe::alone(direction_or_up(mean), SlopeVariance::clamped((1.0 - length) / length));
+        let of = |light: &IncidentLight| {
+            let specular = if brdf.is_specular() {
                 let n = if texel.at_means {
                     whole.mean
                 } else {
-                    answering(&whole, whole.mean, width, light.way.wh)
+                    responding_normal(&whole, whole.mean, width, light.directions.wh)
                 };
-                lobe(light.way.wh) * reflection.factor(n, &light.way, finish.gloss)
+                lobe(light.directions.wh) * brdf.factor(n, &light.directions, params.roughness)
             } else {
                 0.0
             };
-            light.irradiance * together(reflection, &finish, &light.way, (specular, diffuse(light.way.wi)))
+            light.irradiance
+                * combine(brdf, &params, &light.directions, (specular, diffuse(light.directions.wi)))
         };
         return lights.iter().map(of).sum();
     };
     let mut sum = DVec3::ZERO;
     for lobe in &lobes {
-        let finish = (texel.finish)(Some(lobe.layer));
-        let (mu, base) = (lobe.direction(), reflection.width(finish.gloss));
-        let widening = lobe.variance.widen(finish.gloss);
-        for Lit { way, irradiance } in lights {
-            let f = if reflection.is_specular() {
-                reflection.lobe.evaluate_widened(widening, cosine(way.wh, lobe.mean))
+        let params = (texel.params)(Some(lobe.layer));
+        let (mu, base) = (lobe.direction(), brdf.width(params.roughness));
+        let widening = lobe.variance.widen(params.roughness);
+        for IncidentLight { directions, irradiance } in lights {
+            let f = if brdf.is_specular() {
+                brdf.lobe.evaluate_widened(widening, cosine(directions.wh, lobe.mean))
             } else {
                 0.0
             };
             let specular = if f > 0.0 {
-                let n = if texel.at_means { mu } else { answering(lobe, mu, base, way.wh) };
-                f * reflection.factor(n, way, finish.gloss)
+                let n = if texel.at_means { mu } else { responding_normal(lobe, mu, base, directions.wh) };
+                f * brdf.factor(n, directions, params.roughness)
             } else {
                 0.0
             };
-            let diffuse = Lambert::SHARP.evaluate_widened(lobe.variance, way.wi.dot(mu));
-            sum += *irradiance * lobe.weight * together(reflection, &finish, way, (specular, diffuse));
+            let diffuse = Lambert::SHARP.evaluate_widened(lobe.variance, directions.wi.dot(mu));
+            sum += *irradiance * lobe.weight * combine(brdf, &params, directions, (specular, diffuse));
         }
     }
     sum
 }
 
 /// Mean direction of a lobe's normals that send light along the half-vector.
-pub(super) fn answering(lobe: &Shaded, mu: DVec3, base: SlopeVariance, wh: DVec3) -> DVec3 {
+pub(super) fn responding_normal(lobe: &NormalLobe, mu: DVec3, base: SlopeVariance, wh: DVec3) -> DVec3 {
     (mu * base.get() + wh * lobe.variance.get()).try_normalize().unwrap_or(mu)
 }
 
 /// Puts colours on the specular and the diffuse part.
-pub(super) fn together(
-    reflection: &Reflection,
-    finish: &Finish,
-    way: &Way,
+pub(super) fn combine(
+    brdf: &Brdf,
+    params: &SurfaceParams,
+    directions: &Directions,
     (specular, diffuse): (f64, f64),
 ) -> DVec3 {
-    let diffuse = finish.diffuse * (diffuse.max(0.0) / PI);
-    if !reflection.is_specular() {
+    let diffuse = params.diffuse * (diffuse.max(0.0) / PI);
+    if !brdf.is_specular() {
         return diffuse;
     }
-    let fresnel = reflection.model.fresnel(finish.specular, way.u);
-    reflection.lobe.tint(way.u) * fresnel * specular.max(0.0)
-        + reflection.model.diffuse_share(fresnel) * diffuse
+    let fresnel = brdf.shading.fresnel(params.specular, directions.u);
+    brdf.lobe.tint(directions.u) * fresnel * specular.max(0.0) + brdf.shading.diffuse_share(fresnel) * diffuse
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::brdf;
+    use crate::brdf::ShadingModel;
     use crate::ndf;
-    use crate::reflection::Model;
     use glam::Vec3;
 
     /// Normals of a Gaussian of slopes on an even lattice, some 30 degrees wide.
@@ -157,9 +156,10 @@ mod tests {
     fn factors_belong_to_the_normals_that_answer() {
         // One wide lobe under a narrow BRDF: light comes from a few of its normals, not from the mean.
         let normals = normals();
-        let finish = Finish { diffuse: DVec3::ZERO, specular: DVec3::ONE, gloss: SlopeVariance::ZERO };
-        for model in Model::ALL {
-            let reflection = Reflection { lobe: brdf::parse("blinn-phong:200").unwrap(), model };
+        let params =
+            SurfaceParams { diffuse: DVec3::ZERO, specular: DVec3::ONE, roughness: SlopeVariance::ZERO };
+        for shading in ShadingModel::ALL {
+            let brdf = Brdf { lobe: brdf::parse("blinn-phong:200").unwrap(), shading };
             for method in ["vmf:1", "slopes"] {
                 let method = ndf::parse(method).unwrap();
                 let mut channels = vec![0.0; 4 * method.layers()];
@@ -173,35 +173,36 @@ mod tests {
                     method.accumulate_row(&row(n), &mut one);
                     channels.iter_mut().zip(&one).for_each(|(sum, c)| *sum += c / normals.len() as f32);
                 }
-                let prepared = method.prepare(&reflection, SlopeVariance::ZERO);
+                let prepared = method.prepare(&brdf, SlopeVariance::ZERO);
                 let (mut faithful, mut ours) = (0.0, 0.0);
                 for k in 0..60 {
                     let (sin, cos) = (0.1 * f64::from(k)).sin_cos();
                     let wi = DVec3::new(0.7 * cos, 0.7 * sin, 0.6).normalize();
                     let wo = DVec3::new(0.5 * sin, -0.3, 0.8).normalize();
-                    let way = Way::new(wi, wo).unwrap();
+                    let directions = Directions::new(wi, wo).unwrap();
                     // The factor that the facets have together, each as bright as its lobe: mean f c over mean f.
-                    let lobe = |n: &Vec3| reflection.lobe.evaluate(n.as_dvec3().dot(way.wh));
-                    let bright = |n: &Vec3| lobe(n) * reflection.factor(n.as_dvec3(), &way, finish.gloss);
+                    let lobe = |n: &Vec3| brdf.lobe.evaluate(n.as_dvec3().dot(directions.wh));
+                    let bright =
+                        |n: &Vec3| lobe(n) * brdf.factor(n.as_dvec3(), &directions, params.roughness);
                     let exact =
                         normals.iter().map(bright).sum::<f64>() / normals.iter().map(lobe).sum::<f64>();
                     let by = |at_means| {
                         let texel = FilteredTexel {
                             channels: &channels,
-                            finish: &|_| finish,
+                            params: &|_| params,
                             prepared: &prepared,
                             at_means,
-                            relief: None,
+                            slope_map: None,
                         };
-                        let lit = Lit { way, irradiance: DVec3::ONE };
-                        method.reflect(&texel, &reflection, &[lit]).x
+                        let lit = IncidentLight { directions, irradiance: DVec3::ONE };
+                        method.reflect(&texel, &brdf, &[lit]).x
                     };
                     // The method's own lobe is the same in both; the mean of these normals is the vertical.
-                    let at_mean = reflection.factor(DVec3::Z, &way, finish.gloss);
+                    let at_mean = brdf.factor(DVec3::Z, &directions, params.roughness);
                     faithful += (at_mean - exact).powi(2);
                     ours += (at_mean * by(false) / by(true) - exact).powi(2);
                 }
-                assert!(ours < 0.1 * faithful, "{model:?} {}: {ours} {faithful}", method.spelling());
+                assert!(ours < 0.1 * faithful, "{shading:?} {}: {ours} {faithful}", method.spelling());
             }
         }
     }

@@ -4,7 +4,7 @@
 alias Channels = array<vec4<f32>, ALL_LAYERS>;
 
 // A lobe ready to be shaded: the BRDF widened by `variance`, around `mean`.
-struct Shaded {
+struct NormalLobe {
     // Mean direction; for planar lobes (x, y, 0).
     mean: vec3<f32>,
     // Share of the texel.
@@ -20,34 +20,34 @@ fn direction_or_up(v: vec3<f32>) -> vec3<f32> {
 }
 
 // Mean direction of a lobe's normals that send light along the half-vector: those of the product of two Gaussians.
-fn answering(lobe: Shaded, mu: vec3<f32>, base: f32, wh: vec3<f32>) -> vec3<f32> {
+fn responding_normal(lobe: NormalLobe, mu: vec3<f32>, base: f32, wh: vec3<f32>) -> vec3<f32> {
     let v = mu * base + wh * lobe.variance;
     let square = dot(v, v);
     return select(mu, v * inverseSqrt(max(square, 1e-30)), square > 1e-30);
 }
 
 // Puts colours on the specular and the diffuse part.
-fn together(reflection: Reflection, finish: Finish, way: Way, specular: f32, diffuse: f32) -> vec3<f32> {
-    let lambert = finish.diffuse * (max(diffuse, 0.0) / PI);
+fn combine(brdf: Brdf, params: SurfaceParams, directions: Directions, specular: f32, diffuse: f32) -> vec3<f32> {
+    let lambert = params.diffuse * (max(diffuse, 0.0) / PI);
     if !SPECULAR {
         return lambert;
     }
-    let f = fresnel(reflection.model, finish.specular, way.u);
-    return brdf_tint(way.u) * f * max(specular, 0.0) + diffuse_share(reflection.model, f) * lambert;
+    let f = fresnel(brdf.shading, params.specular, directions.u);
+    return lobe_tint(directions.u) * f * max(specular, 0.0) + diffuse_share(brdf.shading, f) * lambert;
 }
 
 // What a layer's lobe is made of: what it carries, or `plain` where lobes carry nothing.
-fn finish_of(channels: ptr<function, Channels>, layer: u32, plain: Finish) -> Finish {
-    var finish = plain;
+fn params_of(channels: ptr<function, Channels>, layer: u32, plain: SurfaceParams) -> SurfaceParams {
+    var params = plain;
     if ATTRIBUTES > 0u {
         // A lobe's attributes are stored times its weight.
         let share = 1.0 / max((*channels)[layer].x, 1e-30);
         let first = (*channels)[min(LAYERS + layer, ALL_LAYERS - 1u)] * share;
-        finish.diffuse = first.xyz;
-        finish.gloss = max(first.w, 0.0);
+        params.diffuse = first.xyz;
+        params.roughness = max(first.w, 0.0);
         if ATTRIBUTES > 1u {
-            finish.specular = (*channels)[min(2u * LAYERS + layer, ALL_LAYERS - 1u)].xyz * share;
+            params.specular = (*channels)[min(2u * LAYERS + layer, ALL_LAYERS - 1u)].xyz * share;
         }
     }
-    return finish;
+    return params;
 }

@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use super::{Decoded, Evaluator, FlatLobe, Method, Representation, Row, Sample};
-use crate::brdf::Brdf;
+use crate::brdf::Lobe;
 use crate::shader::Shader;
 use crate::sphere::{MAX_SH_ORDER, sh_count, spherical_harmonics};
 
@@ -56,9 +56,9 @@ impl From<Coefficients> for Decoded {
 }
 
 impl Sh {
-    fn zonal(&self, brdf: &dyn Brdf) -> Vec<f64> {
-        let printed = if self.printed { brdf.zonal_as_printed(self.order) } else { None };
-        printed.unwrap_or_else(|| brdf.zonal(self.order))
+    fn zonal(&self, lobe: &dyn Lobe) -> Vec<f64> {
+        let printed = if self.printed { lobe.zonal_as_printed(self.order) } else { None };
+        printed.unwrap_or_else(|| lobe.zonal(self.order))
     }
 
     /// `rho_l Y_lm(w)` for every l and m: what the stored coefficients are multiplied with.
@@ -142,14 +142,14 @@ impl Representation for Sh {
         DVec3::new(x.into(), y.into(), z.into()) * (4.0 * PI / 3.0).sqrt()
     }
 
-    fn table(&self, brdf: &dyn Brdf) -> Vec<f64> {
-        self.zonal(brdf)
+    fn table(&self, lobe: &dyn Lobe) -> Vec<f64> {
+        self.zonal(lobe)
     }
 
     fn effective_with<'a>(
         &'a self,
         lobes: &Coefficients,
-        _brdf: &'a dyn Brdf,
+        _brdf: &'a dyn Lobe,
         table: &'a [f64],
     ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         let lobes = *lobes;
@@ -161,18 +161,18 @@ impl Representation for Sh {
         Shader { table: self.order + 1, ..Shader::new(sources).constant("ORDER", self.order as u32) }
     }
 
-    fn effective<'a>(&'a self, lobes: &Coefficients, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        let (rho, lobes) = (self.zonal(brdf), *lobes);
+    fn effective<'a>(&'a self, lobes: &Coefficients, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+        let (rho, lobes) = (self.zonal(lobe), *lobes);
         Box::new(move |w| clamped_dot(&self.weights(&rho, w), &lobes.gamma))
     }
 
-    fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
-        let rho = self.zonal(brdf);
+    fn evaluator<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
+        let rho = self.zonal(lobe);
         let weights = directions.iter().flat_map(|w| self.weights(&rho, *w)).collect();
         Box::new(ShEvaluator { weights, count: sh_count(self.order) })
     }
 
-    fn flat_lobe(&self, _brdf: &dyn Brdf) -> FlatLobe {
+    fn flat_lobe(&self, _brdf: &dyn Lobe) -> FlatLobe {
         FlatLobe::BandLimited(self.order)
     }
 }

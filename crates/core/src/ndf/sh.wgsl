@@ -18,48 +18,37 @@ fn mean_normal(gamma: ptr<function, Decoded>) -> vec3<f32> {
 // The series, for the zonal coefficients of a lobe.
 fn series(gamma: ptr<function, Decoded>, rho: ptr<function, array<f32, TABLE>>, w: vec3<f32>) -> f32 {
     var sum = 0.0;
-    // (cos m phi, sin m phi) sin^m theta = Re, Im of (x + iy)^m.
     var power = vec2<f32>(1.0, 0.0);
-    var diagonal = sqrt(1.0 / (4.0 * PI));
+    var diagonal = 0.0;
     for (var m = 0u; m <= ORDER; m++) {
-        let mf = f32(m);
-        if m > 0u {
-            diagonal *= sqrt((2.0 * mf + 1.0) / (2.0 * mf));
-        }
-        var before = 0.0;
-        var now = diagonal * select(1.0, sqrt(2.0), m > 0u);
-        var ratio = 1.0;
+        diagonal = harmonic_diagonal(diagonal, m);
+        var h = first_harmonic(diagonal, m);
         for (var l = m; l <= ORDER; l++) {
             let i = l * l + l;
-            let lf = f32(l);
             var g = coefficient(gamma, i + m) * power.x;
             if m > 0u {
                 g += coefficient(gamma, i - m) * power.y;
             }
-            sum += (*rho)[l] * now * g;
-            let next = sh_ratio(lf + 1.0, mf);
-            let after = next * w.z * now - select(0.0, next / ratio, l > m) * before;
-            before = now;
-            now = after;
-            ratio = next;
+            sum += (*rho)[l] * h.value * g;
+            h = next_harmonic(h, l, m, w.z);
         }
-        power = vec2<f32>(power.x * w.x - power.y * w.y, power.x * w.y + power.y * w.x);
+        power = next_power(power, w);
     }
     // What rings below zero is held there.
     return max(sum, 0.0);
 }
 
-fn effective(gamma: ptr<function, Decoded>, reflection: Reflection, gloss: f32, w: vec3<f32>) -> f32 {
-    var table = reflection.table;
+fn effective(gamma: ptr<function, Decoded>, brdf: Brdf, roughness: f32, w: vec3<f32>) -> f32 {
+    var table = brdf.table;
     var rho: array<f32, TABLE>;
     for (var l = 0u; l <= ORDER; l++) {
-        rho[l] = tabulated(&table, vec2<f32>(reflection.gloss, reflection.span), l, gloss, 0.5 * f32(l * (l + 1u)));
+        rho[l] = tabulated(&table, vec2<f32>(brdf.roughness, brdf.span), l, roughness, 0.5 * f32(l * (l + 1u)));
     }
     return series(gamma, &rho, w);
 }
 
-fn effective_diffuse(gamma: ptr<function, Decoded>, reflection: Reflection, w: vec3<f32>) -> f32 {
-    var table = reflection.table;
+fn effective_diffuse(gamma: ptr<function, Decoded>, brdf: Brdf, w: vec3<f32>) -> f32 {
+    var table = brdf.table;
     var rho: array<f32, TABLE>;
     for (var l = 0u; l <= ORDER; l++) {
         rho[l] = tabulated_diffuse(&table, l);

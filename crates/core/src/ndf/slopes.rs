@@ -15,7 +15,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 use super::leadr::SlopeGrid;
 use super::{Decoded, Representation, Row, Sample};
-use crate::brdf::Brdf;
+use crate::brdf::Lobe;
 use crate::shader::Shader;
 use crate::surface::{SurfaceRow, normal_of_slope, slope_of_normal};
 use crate::units::SlopeVariance;
@@ -107,7 +107,7 @@ impl SlopeGaussian {
 ///
 /// Returns a function of a slope relative to the mean: the density there, per unit of slope area.
 pub(super) fn stretched<'a>(
-    brdf: &'a dyn Brdf,
+    lobe: &'a dyn Lobe,
     base: SlopeVariance,
     covariance: [f64; 3],
 ) -> impl Fn(DVec2) -> f64 + 'a {
@@ -115,7 +115,7 @@ pub(super) fn stretched<'a>(
     move |d| {
         let square = mahalanobis(covariance, d);
         // Per map area: the profile counts facet area, which is 1/u as much.
-        brdf.slope_profile(square) * (1.0 + base.get() * square).sqrt() * area
+        lobe.slope_profile(square) * (1.0 + base.get() * square).sqrt() * area
     }
 }
 
@@ -264,15 +264,15 @@ impl Representation for Slopes {
         Some((lobes, &self.grid))
     }
 
-    fn effective<'a>(&'a self, lobes: &SlopeGaussian, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        let Some(base) = brdf.slope_variance() else {
+    fn effective<'a>(&'a self, lobes: &SlopeGaussian, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+        let Some(base) = lobe.slope_variance() else {
             let samples = slope_samples(lobes);
             return Box::new(move |w| {
-                samples.iter().map(|(n, weight)| weight * brdf.evaluate(w.dot(*n))).sum()
+                samples.iter().map(|(n, weight)| weight * lobe.evaluate(w.dot(*n))).sum()
             });
         };
         let mean = lobes.mean;
-        let p22 = stretched(brdf, base, lobes.widen(base).covariance);
+        let p22 = stretched(lobe, base, lobes.widen(base).covariance);
         Box::new(move |w| {
             if w.z <= 0.0 {
                 return 0.0;
@@ -293,10 +293,10 @@ mod tests {
     fn beckmann_on_gaussian_slopes_is_the_closed_form() {
         // Beckmann's profile per map area is its Gaussian over u: f u³ = P22 / u.
         let alpha = 0.3;
-        let brdf = Beckmann::new(Alpha::new(alpha).unwrap());
+        let lobe = Beckmann::new(Alpha::new(alpha).unwrap());
         let g = SlopeGaussian { height: 0.0, mean: DVec2::new(0.2, -0.1), covariance: [0.05, 0.02, 0.01] };
         let slopes = Slopes::default();
-        let effective = slopes.effective(&g, &brdf);
+        let effective = slopes.effective(&g, &lobe);
         let w = DVec3::new(0.1, 0.3, 0.9).normalize();
         let d = DVec2::new(-w.x, -w.y) / w.z - g.mean;
         let base = alpha * alpha / 2.0;

@@ -22,12 +22,12 @@ fn mean_normal(g: ptr<function, Decoded>) -> vec3<f32> {
     return n / (1.0 + 0.5 * ((*g).covariance.x + (*g).covariance.y));
 }
 
-fn effective(g: ptr<function, Decoded>, reflection: Reflection, gloss: f32, w: vec3<f32>) -> f32 {
+fn effective(g: ptr<function, Decoded>, brdf: Brdf, roughness: f32, w: vec3<f32>) -> f32 {
     if w.z <= 0.0 {
         return 0.0;
     }
-    let base = brdf_widen(reflection.base, gloss);
-    let variance = brdf_variance(base);
+    let base = lobe_widen(brdf.base, roughness);
+    let variance = lobe_variance(base);
     let widened = (*g).covariance + vec3<f32>(variance, variance, 0.0);
     return stretched(base, widened, -w.xy / w.z - (*g).mean) / (w.z * w.z * w.z);
 }
@@ -40,7 +40,7 @@ fn hermite(i: u32) -> vec2<f32> {
     return select(select(near, far, i == 0u || i == 4u) * signs, vec2<f32>(0.0, 0.533333333333333), i == 2u);
 }
 
-fn effective_diffuse(g: ptr<function, Decoded>, reflection: Reflection, w: vec3<f32>) -> f32 {
+fn effective_diffuse(g: ptr<function, Decoded>, brdf: Brdf, w: vec3<f32>) -> f32 {
     let c = (*g).covariance;
     let deviation = sqrt(c.x);
     let shear = select(0.0, c.z / deviation, deviation > 0.0);

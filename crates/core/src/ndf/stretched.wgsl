@@ -4,7 +4,7 @@
 fn stretched(base: f32, covariance: vec3<f32>, d: vec2<f32>) -> f32 {
     let square = mahalanobis(covariance, d);
     // Per map area: the profile counts facet area, which is 1/u as much.
-    return brdf_slope_profile(base, square) * sqrt(1.0 + brdf_variance(base) * square) * inverseSqrt(determinant_of(covariance));
+    return lobe_slope_profile(base, square) * sqrt(1.0 + lobe_variance(base) * square) * inverseSqrt(determinant_of(covariance));
 }
 
 // The determinant of a covariance.

@@ -6,9 +6,9 @@
 
 use glam::{DVec3, Vec3};
 
-use super::mixture::{Cosine, Shaded, cosine};
+use super::mixture::{Cosine, NormalLobe, cosine};
 use super::{Decoded, Representation, Row, Sample, direction_or_up, no_parameters};
-use crate::brdf::Brdf;
+use crate::brdf::Lobe;
 use crate::shader::Shader;
 use crate::units::SlopeVariance;
 
@@ -27,15 +27,15 @@ pub(super) const ROW: Row = Row {
 
 /// An isotropic lobe of normals.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lobe {
+pub struct MeanLobe {
     /// Mean normal, of length `L` at most 1.
     pub mean: DVec3,
     /// Spread about it.
     pub variance: SlopeVariance,
 }
 
-impl From<Lobe> for Decoded {
-    fn from(lobe: Lobe) -> Self {
+impl From<MeanLobe> for Decoded {
+    fn from(lobe: MeanLobe) -> Self {
         Self::Mean(lobe.mean)
     }
 }
@@ -46,7 +46,7 @@ const MIN_LENGTH: f64 = 1e-3;
 
 impl Representation for Toksvig {
     type Sums = Vec3;
-    type Lobes = Lobe;
+    type Lobes = MeanLobe;
 
     fn spelling(&self) -> String {
         ROW.name.to_owned()
@@ -76,18 +76,18 @@ impl Representation for Toksvig {
         Vec3::from_slice(channels)
     }
 
-    fn decode(&self, sums: &Vec3) -> Lobe {
+    fn decode(&self, sums: &Vec3) -> MeanLobe {
         let mean = sums.as_dvec3();
         let length = mean.length().clamp(MIN_LENGTH, 1.0);
-        Lobe { mean, variance: SlopeVariance::clamped((1.0 - length) / length) }
+        MeanLobe { mean, variance: SlopeVariance::clamped((1.0 - length) / length) }
     }
 
-    fn mean(&self, lobes: &Lobe) -> DVec3 {
+    fn mean(&self, lobes: &MeanLobe) -> DVec3 {
         lobes.mean
     }
 
-    fn effective<'a>(&'a self, lobes: &Lobe, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        let (mu, widened) = (direction_or_up(lobes.mean), brdf.widen(lobes.variance));
+    fn effective<'a>(&'a self, lobes: &MeanLobe, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+        let (mu, widened) = (direction_or_up(lobes.mean), lobe.widen(lobes.variance));
         Box::new(move |w| widened.evaluate(w.dot(mu)))
     }
 
@@ -99,8 +99,8 @@ impl Representation for Toksvig {
         ])
     }
 
-    fn isotropic(&self, lobes: &Lobe) -> Option<(Cosine, Vec<Shaded>)> {
-        Some((cosine, vec![Shaded::alone(direction_or_up(lobes.mean), lobes.variance)]))
+    fn isotropic(&self, lobes: &MeanLobe) -> Option<(Cosine, Vec<NormalLobe>)> {
+        Some((cosine, vec![NormalLobe::alone(direction_or_up(lobes.mean), lobes.variance)]))
     }
 }
 
@@ -114,10 +114,10 @@ mod tests {
     #[test]
     fn is_toksvigs_formula_for_blinn_phong() {
         let s = 50.0;
-        let brdf = BlinnPhong { exponent: Exponent::new(s).unwrap() };
+        let blinn_phong = BlinnPhong { exponent: Exponent::new(s).unwrap() };
         for length in [0.2_f64, 0.7, 0.95, 1.0] {
             let lobe = Toksvig.decode(&Vec3::new(0.0, 0.0, length as f32));
-            let effective = Toksvig.effective(&lobe, &brdf);
+            let effective = Toksvig.effective(&lobe, &blinn_phong);
             let f_t = length / (length + s * (1.0 - length));
             for u in [0.5_f64, 0.9, 1.0] {
                 let w = DVec3::new((1.0 - u * u).sqrt(), 0.0, u);

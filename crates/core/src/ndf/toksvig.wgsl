@@ -5,7 +5,7 @@ const NORMALISED: bool = false;
 // Shortest mean normal that still widens.
 const MIN_LENGTH: f32 = 1e-3;
 
-fn decode_lobe(sums: vec4<f32>) -> Shaded {
+fn decode_lobe(sums: vec4<f32>) -> NormalLobe {
     let short = clamp(length(sums.xyz), MIN_LENGTH, 1.0);
-    return Shaded(direction_or_up(sums.xyz), 1.0, (1.0 - short) / short);
+    return NormalLobe(direction_or_up(sums.xyz), 1.0, (1.0 - short) / short);
 }

@@ -3,10 +3,10 @@
 fn reflect_displaced(
     channels: ptr<function, Channels>,
     decoded: ptr<function, Decoded>,
-    plain: Finish,
-    reflection: Reflection,
-    way: Way,
+    plain: SurfaceParams,
+    brdf: Brdf,
+    directions: Directions,
     by: mat2x2<f32>,
 ) -> vec3<f32> {
-    return reflect_texel(channels, decoded, plain, reflection, way);
+    return reflect_texel(channels, decoded, plain, brdf, directions);
 }

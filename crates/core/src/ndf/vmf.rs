@@ -10,9 +10,11 @@
 
 use glam::DVec3;
 
-use super::mixture::{Cosine, Lobes, MixtureEvaluator, Shaded, cosine, effective, mean_of, parse_mixture};
+use super::mixture::{
+    Cosine, LobeSums, MixtureEvaluator, NormalLobe, cosine, effective, mean_of, parse_mixture,
+};
 use super::{Decoded, Evaluator, Method, MixtureLobe, Representation, Row, Sample};
-use crate::brdf::Brdf;
+use crate::brdf::Lobe;
 use crate::fit::{Fit, Four, LobeKind, from_pole};
 use crate::shader::Shader;
 use crate::units::SlopeVariance;
@@ -53,7 +55,7 @@ const MIN_LENGTH: f64 = 1e-3;
 
 impl Vmf {
     /// The lobes that the sums decode to, dead ones left out.
-    fn lobes(sums: &Lobes) -> Vec<Shaded> {
+    fn lobes(sums: &LobeSums) -> Vec<NormalLobe> {
         let total = sums.total();
         let lobe = |(layer, &[alpha, x, y, w]): (usize, &Four)| {
             let alpha = f64::from(alpha);
@@ -63,7 +65,7 @@ impl Vmf {
             let length = (1.0 - short).sqrt().max(MIN_LENGTH);
             let mean = DVec3::new(x, y, 1.0 - w).try_normalize().unwrap_or(DVec3::Z);
             let variance = SlopeVariance::clamped(short / (length * (3.0 - length * length)));
-            Shaded { layer, weight: alpha / total, mean, variance }
+            NormalLobe { layer, weight: alpha / total, mean, variance }
         };
         sums.alive().map(lobe).collect()
     }
@@ -73,12 +75,12 @@ impl Vmf {
 #[derive(Clone, Debug, PartialEq)]
 pub struct VmfMixture {
     /// Lobes that are alive.
-    pub lobes: Vec<Shaded>,
+    pub lobes: Vec<NormalLobe>,
 }
 
 impl From<VmfMixture> for Decoded {
     fn from(mixture: VmfMixture) -> Self {
-        let lobe = |l: &Shaded| MixtureLobe {
+        let lobe = |l: &NormalLobe| MixtureLobe {
             layer: l.layer,
             weight: l.weight,
             mean: l.mean,
@@ -89,7 +91,7 @@ impl From<VmfMixture> for Decoded {
 }
 
 impl Representation for Vmf {
-    type Sums = Lobes;
+    type Sums = LobeSums;
     type Lobes = VmfMixture;
 
     fn spelling(&self) -> String {
@@ -104,21 +106,21 @@ impl Representation for Vmf {
         if self.origin { "sums" } else { "sums-about-pole" }
     }
 
-    fn zero(&self) -> Lobes {
-        Lobes::zero(self.fit.lobes)
+    fn zero(&self) -> LobeSums {
+        LobeSums::zero(self.fit.lobes)
     }
 
     /// Without a fit, all normals go to the first lobe.
-    fn accumulate(&self, sums: &mut Lobes, sample: &Sample, weight: f32) {
+    fn accumulate(&self, sums: &mut LobeSums, sample: &Sample, weight: f32) {
         let n = sample.normal.to_array();
         sums.add(0, [1.0, n[0], n[1], from_pole(&n)], weight);
     }
 
-    fn blend(&self, sums: &mut Lobes, part: &Lobes, weight: f32) {
+    fn blend(&self, sums: &mut LobeSums, part: &LobeSums, weight: f32) {
         sums.blend(part, weight);
     }
 
-    fn pack(&self, sums: &Lobes, channels: &mut [f32]) {
+    fn pack(&self, sums: &LobeSums, channels: &mut [f32]) {
         sums.map(|lobe| Representation::store_lobe(self, lobe)).to_channels(channels);
     }
 
@@ -127,11 +129,11 @@ impl Representation for Vmf {
         [alpha, x, y, if self.origin { alpha - w } else { w }]
     }
 
-    fn unpack(&self, channels: &[f32]) -> Lobes {
-        Lobes::from_channels(self.fit.lobes, channels).map(|lobe| Representation::store_lobe(self, lobe))
+    fn unpack(&self, channels: &[f32]) -> LobeSums {
+        LobeSums::from_channels(self.fit.lobes, channels).map(|lobe| Representation::store_lobe(self, lobe))
     }
 
-    fn decode(&self, sums: &Lobes) -> VmfMixture {
+    fn decode(&self, sums: &LobeSums) -> VmfMixture {
         VmfMixture { lobes: Self::lobes(sums) }
     }
 
@@ -139,8 +141,8 @@ impl Representation for Vmf {
         mean_of(&lobes.lobes)
     }
 
-    fn effective<'a>(&'a self, lobes: &VmfMixture, brdf: &'a dyn Brdf) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        effective(&lobes.lobes, brdf, cosine)
+    fn effective<'a>(&'a self, lobes: &VmfMixture, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+        effective(&lobes.lobes, lobe, cosine)
     }
 
     fn shader(&self) -> Shader {
@@ -152,13 +154,13 @@ impl Representation for Vmf {
         .constant("ORIGIN", self.origin)
     }
 
-    fn isotropic(&self, lobes: &VmfMixture) -> Option<(Cosine, Vec<Shaded>)> {
+    fn isotropic(&self, lobes: &VmfMixture) -> Option<(Cosine, Vec<NormalLobe>)> {
         Some((cosine, lobes.lobes.clone()))
     }
 
-    fn evaluator<'a>(&'a self, brdf: &'a dyn Brdf, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
+    fn evaluator<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
         let lobes = |channels: &[f32]| Self::lobes(&self.unpack(channels));
-        Box::new(MixtureEvaluator { lobes, cosine, brdf, directions })
+        Box::new(MixtureEvaluator { lobes, cosine, lobe, directions })
     }
 
     fn fit(&self) -> Option<Fit> {

@@ -8,10 +8,10 @@ const DEAD: f32 = 1e-5;
 // Shortest |r| that has a direction.
 const MIN_LENGTH: f32 = 1e-3;
 
-fn decode_lobe(sums: vec4<f32>) -> Shaded {
+fn decode_lobe(sums: vec4<f32>) -> NormalLobe {
     let alpha = sums.x;
     if !(alpha > DEAD) {
-        return Shaded(vec3<f32>(0.0, 0.0, 1.0), 0.0, 0.0);
+        return NormalLobe(vec3<f32>(0.0, 0.0, 1.0), 0.0, 0.0);
     }
     // About the pole, w = 1 - r.z, or as the paper has it.
     let w = select(sums.w, alpha - sums.w, ORIGIN) / alpha;
@@ -19,5 +19,5 @@ fn decode_lobe(sums: vec4<f32>) -> Shaded {
     // 1 - |r|² of r = (x, y, 1 - w).
     let short = clamp(w * (2.0 - w) - dot(xy, xy), 0.0, 1.0);
     let r = max(sqrt(1.0 - short), MIN_LENGTH);
-    return Shaded(direction_or_up(vec3<f32>(xy, 1.0 - w)), alpha, short / (r * (3.0 - r * r)));
+    return NormalLobe(direction_or_up(vec3<f32>(xy, 1.0 - w)), alpha, short / (r * (3.0 - r * r)));
 }

@@ -6,22 +6,22 @@
 fn reflect_texel(
     channels: ptr<function, Channels>,
     decoded: ptr<function, Decoded>,
-    plain: Finish,
-    reflection: Reflection,
-    way: Way,
+    plain: SurfaceParams,
+    brdf: Brdf,
+    directions: Directions,
 ) -> vec3<f32> {
     var specular = 0.0;
     if SPECULAR {
         let mean = mean_normal(decoded);
         let short = clamp(length(mean), 1e-3, 1.0);
         let mu = direction_or_up(mean);
-        let all = Shaded(mu, 1.0, (1.0 - short) / short);
+        let all = NormalLobe(mu, 1.0, (1.0 - short) / short);
         var n = mu;
-        if reflection.at_means == 0u {
-            n = answering(all, mu, lobe_width(reflection, plain.gloss), way.wh);
+        if brdf.at_means == 0u {
+            n = responding_normal(all, mu, brdf_width(brdf, plain.roughness), directions.wh);
         }
-        let lobe = effective(decoded, reflection, plain.gloss, way.wh);
-        specular = lobe * factor(reflection, n, way, plain.gloss);
+        let lobe = effective(decoded, brdf, plain.roughness, directions.wh);
+        specular = lobe * factor(brdf, n, directions, plain.roughness);
     }
-    return together(reflection, plain, way, specular, effective_diffuse(decoded, reflection, way.wi));
+    return combine(brdf, plain, directions, specular, effective_diffuse(decoded, brdf, directions.wi));
 }

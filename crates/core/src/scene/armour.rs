@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3, Vec3};
 
-use super::{Camera, Material, Mesh, Object, Row, Scene, Staging, reflection, sun, zoom};
-use crate::reflection::{Finish, Model};
+use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, brdf, sun, zoom};
+use crate::brdf::{ShadingModel, SurfaceParams};
 use crate::units::SlopeVariance;
 
 /// A torso: height and radii of its cross-section at t from 0 (hip) to 1 (neck).
@@ -30,7 +30,7 @@ pub(super) const ROW: Row = Row {
     name: "armour",
     summary: "golden scale armour on a curved body",
     animation: "the camera moves away",
-    build: |staging: &Staging| {
+    build: |staging: &SceneOptions| {
         // Round the back to front, so that s runs to the right as seen from +z.
         let mesh = Mesh::from_patch((96, 96), DVec2::new(3.0, 2.0), |s, t| torso(s - 0.25, t));
         let distance = zoom(1.6, 14.0, staging.time);
@@ -40,17 +40,17 @@ pub(super) const ROW: Row = Row {
             materials: vec![Material {
                 name: "gold".to_owned(),
                 surface: staging.first_map("armour"),
-                finish: Finish {
+                params: SurfaceParams {
                     diffuse: DVec3::new(0.25, 0.17, 0.05),
                     specular: DVec3::new(0.2, 0.145, 0.055),
-                    gloss: SlopeVariance::ZERO,
+                    roughness: SlopeVariance::ZERO,
                 },
-                finish_map: None,
-                relief: None,
-                reflection: reflection(Model::Tan, "torrance-sparrow:0.1"),
+                textures: None,
+                displacement: None,
+                brdf: brdf(ShadingModel::Tan, "torrance-sparrow:0.1"),
             }],
             lights: vec![sun([0.6, 0.7, 0.8], [1.2, 1.15, 1.0]), sun([-0.8, 0.2, 0.4], [0.4, 0.45, 0.6])],
-            surroundings: None,
+            environment: None,
             background: Vec3::new(0.02, 0.02, 0.025),
             exposure: 1.0,
         }

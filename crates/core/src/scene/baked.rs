@@ -15,10 +15,10 @@ use super::Material;
 pub struct BakedMaterial {
     /// The method's layers, then those of the attributes that its lobes carry.
     pub pyramid: Pyramid,
-    /// How many attributes lobes carry: albedo with gloss, and specular colour.
+    /// How many attributes lobes carry: albedo with roughness, and specular colour.
     pub attributes: usize,
     /// The same as maps of their own, finest level, for methods whose lobes carry none.
-    pub finish: Vec<Grid<Four>>,
+    pub params: Vec<Grid<Four>>,
 }
 
 impl BakedMaterial {
@@ -32,15 +32,15 @@ impl BakedMaterial {
         progress: &(dyn Fn(f64) + Sync),
     ) -> Self {
         let bake = Bake { surface: &*material.surface, method, precision, progress };
-        let maps = material.finish_map.as_ref().map_or_else(Vec::new, |map| map.grids());
+        let maps = material.textures.as_ref().map_or_else(Vec::new, |map| map.grids());
         if let Some(pyramid) = material.surface.baked(&method.spelling()) {
-            return Self { pyramid: pyramid.clone(), attributes: 0, finish: maps };
+            return Self { pyramid: pyramid.clone(), attributes: 0, params: maps };
         }
         if method.fit().is_some_and(|fit| fit.kind != LobeKind::Peaks) {
             let (pyramid, _) = bake.to_pyramid_with(&maps);
-            return Self { pyramid, attributes: maps.len(), finish: Vec::new() };
+            return Self { pyramid, attributes: maps.len(), params: Vec::new() };
         }
-        Self { pyramid: bake.to_pyramid().0, attributes: 0, finish: maps }
+        Self { pyramid: bake.to_pyramid().0, attributes: 0, params: maps }
     }
 }
 

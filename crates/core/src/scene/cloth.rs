@@ -7,8 +7,8 @@ use glam::{DVec2, DVec3, Vec3};
 
 use super::mesh::grid_triangles;
 use super::sphere::ball;
-use super::{Camera, Material, Mesh, Object, Row, Scene, Staging, Vertex, reflection, sun};
-use crate::reflection::{Finish, Model};
+use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, Vertex, brdf, sun};
+use crate::brdf::{ShadingModel, SurfaceParams};
 use crate::units::SlopeVariance;
 
 /// Cells on a side.
@@ -110,19 +110,19 @@ pub(super) const ROW: Row = Row {
     name: "cloth",
     summary: "woven cloth draping over a ball",
     animation: "the cloth falls and settles",
-    build: |staging: &Staging| {
-        let finish = |diffuse: [f64; 3], specular: f64| Finish {
+    build: |staging: &SceneOptions| {
+        let params = |diffuse: [f64; 3], specular: f64| SurfaceParams {
             diffuse: diffuse.into(),
             specular: DVec3::splat(specular),
-            gloss: SlopeVariance::ZERO,
+            roughness: SlopeVariance::ZERO,
         };
-        let material = |name: &str, surface, finish, lobe| Material {
+        let material = |name: &str, surface, params, lobe| Material {
             name: name.to_owned(),
             surface,
-            finish,
-            finish_map: None,
-            relief: None,
-            reflection: reflection(Model::Han, lobe),
+            params,
+            textures: None,
+            displacement: None,
+            brdf: brdf(ShadingModel::Han, lobe),
         };
         let under = Mesh::from_patch((64, 32), DVec2::ONE, |s, t| BALL * ball(s, t));
         Scene {
@@ -135,13 +135,13 @@ pub(super) const ROW: Row = Row {
                 material(
                     "cloth",
                     staging.first_map("weave"),
-                    finish([0.28, 0.05, 0.09], 0.08),
+                    params([0.28, 0.05, 0.09], 0.08),
                     "blinn-phong:60",
                 ),
-                material("ball", staging.builtin("noise"), finish([0.2, 0.2, 0.22], 0.03), "blinn-phong:40"),
+                material("ball", staging.builtin("noise"), params([0.2, 0.2, 0.22], 0.03), "blinn-phong:40"),
             ],
             lights: vec![sun([-0.5, 0.9, 0.7], [2.6, 2.5, 2.4]), sun([0.9, 0.3, 0.2], [0.5, 0.55, 0.7])],
-            surroundings: None,
+            environment: None,
             background: Vec3::new(0.02, 0.02, 0.025),
             exposure: 1.0,
         }

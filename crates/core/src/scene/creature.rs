@@ -4,8 +4,8 @@ use glam::{DVec2, DVec3, Vec3};
 
 use super::desert::rolling;
 use super::sphere::ball;
-use super::{Camera, Material, Mesh, Object, Row, Scene, Staging, reflection, sun};
-use crate::reflection::{Finish, Model};
+use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, brdf, sun};
+use crate::brdf::{ShadingModel, SurfaceParams};
 use crate::units::SlopeVariance;
 
 /// Catmull-Rom through `points`, at t from 0 to 1.
@@ -67,19 +67,19 @@ fn objects() -> Vec<Object> {
         objects.push(tube(&leg(hip, side), (24, 48), DVec2::new(0.5, 1.0), 0));
     }
     // A crest of spikes along the back, and two horns.
-    let horn = |root: DVec3, way: DVec3, length: f64, width: f64| {
+    let horn = |root: DVec3, directions: DVec3, length: f64, width: f64| {
         let points = [
-            (root - 0.3 * way * length, width),
-            (root + 0.4 * way * length, 0.6 * width),
-            (root + way * length, 0.004),
+            (root - 0.3 * directions * length, width),
+            (root + 0.4 * directions * length, 0.6 * width),
+            (root + directions * length, 0.004),
         ];
         tube(&points, (16, 16), DVec2::new(0.25, 0.5), 1)
     };
     for i in 0..14 {
         let t = 0.2 + 0.045 * f64::from(i);
         let (middle, radius) = spline(&body, t);
-        let way = DVec3::new(-0.5, 1.0, 0.0).normalize();
-        objects.push(horn(middle + DVec3::Y * radius, way, 0.14 + 0.25 * radius, 0.045));
+        let directions = DVec3::new(-0.5, 1.0, 0.0).normalize();
+        objects.push(horn(middle + DVec3::Y * radius, directions, 0.14 + 0.25 * radius, 0.045));
     }
     for side in [1.0, -1.0] {
         objects.push(horn(
@@ -106,22 +106,22 @@ pub(super) const ROW: Row = Row {
     name: "creature",
     summary: "a horned lizard on sand, four materials",
     animation: "its wet skin dries: the highlights widen and fade",
-    build: |staging: &Staging| {
-        let material = |name: &str, surface, finish, lobe: &str| Material {
+    build: |staging: &SceneOptions| {
+        let material = |name: &str, surface, params, lobe: &str| Material {
             name: name.to_owned(),
             surface,
-            finish,
-            finish_map: None,
-            relief: None,
-            reflection: reflection(Model::Han, lobe),
+            params,
+            textures: None,
+            displacement: None,
+            brdf: brdf(ShadingModel::Han, lobe),
         };
-        let finish = |diffuse: [f64; 3], specular: f64, gloss: f64| Finish {
+        let params = |diffuse: [f64; 3], specular: f64, roughness: f64| SurfaceParams {
             diffuse: diffuse.into(),
             specular: DVec3::splat(specular),
-            gloss: SlopeVariance::clamped(gloss),
+            roughness: SlopeVariance::clamped(roughness),
         };
         let dry = staging.time;
-        let skin = finish(
+        let skin = params(
             [0.12 + 0.08 * dry, 0.2 + 0.1 * dry, 0.07 + 0.06 * dry],
             0.09 - 0.06 * dry,
             0.06 * dry * dry,
@@ -134,24 +134,24 @@ pub(super) const ROW: Row = Row {
                 material(
                     "horn",
                     staging.builtin("ripples"),
-                    finish([0.45, 0.36, 0.24], 0.06, 0.0),
+                    params([0.45, 0.36, 0.24], 0.06, 0.0),
                     "blinn-phong:60",
                 ),
                 material(
                     "eye",
                     staging.builtin("foil"),
-                    finish([0.02, 0.015, 0.01], 0.1, 0.0),
+                    params([0.02, 0.015, 0.01], 0.1, 0.0),
                     "blinn-phong:400",
                 ),
                 material(
                     "sand",
                     staging.builtin("dunes"),
-                    finish([0.62, 0.45, 0.27], 0.015, 0.0),
+                    params([0.62, 0.45, 0.27], 0.015, 0.0),
                     "blinn-phong:20",
                 ),
             ],
             lights: vec![sun([0.5, 0.9, 0.75], [2.6, 2.45, 2.2]), sun([-0.7, 0.45, 0.25], [0.6, 0.75, 1.0])],
-            surroundings: None,
+            environment: None,
             background: Vec3::new(0.3, 0.42, 0.58),
             exposure: 1.0,
         }

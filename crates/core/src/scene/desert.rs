@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3, Vec3};
 
-use super::{Camera, Material, Mesh, Object, Row, Scene, Staging, reflection, sun, zoom};
-use crate::reflection::{Finish, Model};
+use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, brdf, sun, zoom};
+use crate::brdf::{ShadingModel, SurfaceParams};
 use crate::units::SlopeVariance;
 
 /// Side of the terrain.
@@ -25,7 +25,7 @@ pub(super) const ROW: Row = Row {
     name: "desert",
     summary: "dunes and ripples over rolling terrain under a low sun",
     animation: "the camera rises, from ripples to a whole desert",
-    build: |staging: &Staging| {
+    build: |staging: &SceneOptions| {
         let place = |s: f64, t: f64| {
             let (x, z) = ((s - 0.5) * SIDE, (0.5 - t) * SIDE);
             DVec3::new(x, rolling(x, z, 0.55), z)
@@ -40,17 +40,17 @@ pub(super) const ROW: Row = Row {
             materials: vec![Material {
                 name: "sand".to_owned(),
                 surface: staging.first_map("dunes"),
-                finish: Finish {
+                params: SurfaceParams {
                     diffuse: DVec3::new(0.75, 0.5, 0.27),
                     specular: DVec3::splat(0.04),
-                    gloss: SlopeVariance::ZERO,
+                    roughness: SlopeVariance::ZERO,
                 },
-                finish_map: None,
-                relief: None,
-                reflection: reflection(Model::Tan, "torrance-sparrow:0.2"),
+                textures: None,
+                displacement: None,
+                brdf: brdf(ShadingModel::Tan, "torrance-sparrow:0.2"),
             }],
             lights: vec![sun([-1.0, 0.42, -0.35], [3.2, 2.7, 2.1]), sun([0.3, 1.0, 0.3], [0.35, 0.45, 0.65])],
-            surroundings: None,
+            environment: None,
             background: Vec3::new(0.25, 0.4, 0.62),
             exposure: 1.0,
         }

@@ -4,8 +4,8 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use glam::{DVec2, DVec3, Vec3};
 
-use super::{Camera, Material, Mesh, Object, Row, Scene, Staging, reflection, sun, zoom};
-use crate::reflection::{Finish, Model};
+use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, brdf, sun, zoom};
+use crate::brdf::{ShadingModel, SurfaceParams};
 use crate::units::SlopeVariance;
 
 /// The square's concentric rings as circles, without thin triangles in the middle (Shirley and Chiu 1997).
@@ -18,7 +18,7 @@ fn on_disk(x: f64, y: f64) -> DVec3 {
     DVec3::new(r * angle.cos(), r * angle.sin(), 0.0)
 }
 
-fn scene(staging: &Staging, camera: Camera) -> Scene {
+fn scene(staging: &SceneOptions, camera: Camera) -> Scene {
     // A disk of radius 1 that faces +z; its map is stretched over the square around it.
     let mut mesh = Mesh::from_patch((32, 32), DVec2::ONE, |s, t| on_disk(2.0 * s - 1.0, 2.0 * t - 1.0));
     for vertex in &mut mesh.vertices {
@@ -32,17 +32,17 @@ fn scene(staging: &Staging, camera: Camera) -> Scene {
         materials: vec![Material {
             name: "silver".to_owned(),
             surface: staging.first_map("carved-disk"),
-            finish: Finish {
+            params: SurfaceParams {
                 diffuse: DVec3::splat(0.12),
                 specular: DVec3::new(0.16, 0.158, 0.15),
-                gloss: SlopeVariance::ZERO,
+                roughness: SlopeVariance::ZERO,
             },
-            finish_map: None,
-            relief: None,
-            reflection: reflection(Model::Tan, "torrance-sparrow:0.08"),
+            textures: None,
+            displacement: None,
+            brdf: brdf(ShadingModel::Tan, "torrance-sparrow:0.08"),
         }],
         lights: vec![sun([-0.5, 0.6, 0.9], [1.0, 0.97, 0.9]), sun([0.7, 0.1, 0.6], [0.35, 0.4, 0.5])],
-        surroundings: None,
+        environment: None,
         background: Vec3::new(0.012, 0.013, 0.016),
         exposure: 1.0,
     }

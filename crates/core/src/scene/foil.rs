@@ -2,15 +2,15 @@
 
 use glam::{DVec2, DVec3, Vec3};
 
-use super::{Camera, Material, Mesh, Object, Row, Scene, Staging, reflection, sun, zoom};
-use crate::reflection::{Finish, Model};
+use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, brdf, sun, zoom};
+use crate::brdf::{ShadingModel, SurfaceParams};
 use crate::units::SlopeVariance;
 
 pub(super) const ROW: Row = Row {
     name: "foil",
     summary: "a gently bent sheet of crumpled foil",
     animation: "the camera moves away",
-    build: |staging: &Staging| {
+    build: |staging: &SceneOptions| {
         let mesh = Mesh::from_patch((48, 48), DVec2::splat(2.0), |s, t| {
             let (x, y) = (2.0 * s - 1.0, 2.0 * t - 1.0);
             DVec3::new(x, y, 0.25 * (1.0 - x * x) + 0.08 * (3.0 * y + x).sin())
@@ -22,17 +22,17 @@ pub(super) const ROW: Row = Row {
             materials: vec![Material {
                 name: "foil".to_owned(),
                 surface: staging.first_map("foil"),
-                finish: Finish {
+                params: SurfaceParams {
                     diffuse: DVec3::splat(0.06),
                     specular: DVec3::new(0.6, 0.6, 0.62),
-                    gloss: SlopeVariance::ZERO,
+                    roughness: SlopeVariance::ZERO,
                 },
-                finish_map: None,
-                relief: None,
-                reflection: reflection(Model::Smith, "ggx:0.12"),
+                textures: None,
+                displacement: None,
+                brdf: brdf(ShadingModel::Smith, "ggx:0.12"),
             }],
             lights: vec![sun([-0.4, 0.7, 1.0], [2.6, 2.5, 2.3]), sun([0.9, 0.2, 0.5], [0.7, 0.8, 1.0])],
-            surroundings: None,
+            environment: None,
             background: Vec3::new(0.015, 0.015, 0.02),
             exposure: 1.0,
         }

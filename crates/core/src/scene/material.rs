@@ -4,51 +4,55 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::Relief;
+use super::Displacement;
+use crate::brdf::{Brdf, SurfaceParams};
 use crate::grid::Grid;
-use crate::reflection::{Finish, Reflection};
 use crate::surface::Surface;
 use crate::units::SlopeVariance;
 
-/// A [`Finish`] for each texel.
+/// A [`SurfaceParams`] for each texel.
 #[derive(Clone, Debug)]
-pub struct FinishMap {
-    /// Diffuse albedo, and the gloss as a slope variance.
-    pub diffuse_gloss: Arc<Grid<[f32; 4]>>,
+pub struct SurfaceTextures {
+    /// Diffuse albedo, and the roughness as a slope variance.
+    pub diffuse_roughness: Arc<Grid<[f32; 4]>>,
     /// Specular colour, where it changes from place to place; the fourth is 1.
     pub specular: Option<Arc<Grid<[f32; 4]>>>,
 }
 
-impl FinishMap {
+impl SurfaceTextures {
     /// What a texel is made of; `specular` where the map has none.
     #[must_use]
-    pub fn at(&self, x: usize, y: usize, specular: DVec3) -> Finish {
+    pub fn at(&self, x: usize, y: usize, specular: DVec3) -> SurfaceParams {
         let of = |map: &Grid<[f32; 4]>| map.row(y)[x];
-        Self::finish(of(&self.diffuse_gloss), self.specular.as_deref().map(of), specular)
+        Self::from_channels(of(&self.diffuse_roughness), self.specular.as_deref().map(of), specular)
     }
 
-    /// The least and the most gloss of any texel.
+    /// The least and the most roughness of any texel.
     #[must_use]
-    pub fn gloss_range(&self) -> (SlopeVariance, SlopeVariance) {
-        let all = || self.diffuse_gloss.texels().iter().map(|texel| texel[3].max(0.0));
+    pub fn roughness_range(&self) -> (SlopeVariance, SlopeVariance) {
+        let all = || self.diffuse_roughness.texels().iter().map(|texel| texel[3].max(0.0));
         let (least, most) = (all().fold(f32::INFINITY, f32::min), all().fold(0.0, f32::max));
         (SlopeVariance::clamped(least.into()), SlopeVariance::clamped(most.into()))
     }
 
-    /// The maps one by one: albedo and gloss, and specular colour where it changes.
+    /// The maps one by one: albedo and roughness, and specular colour where it changes.
     #[must_use]
     pub fn grids(&self) -> Vec<Grid<[f32; 4]>> {
-        std::iter::once(&self.diffuse_gloss).chain(&self.specular).map(|map| (**map).clone()).collect()
+        std::iter::once(&self.diffuse_roughness).chain(&self.specular).map(|map| (**map).clone()).collect()
     }
 
     /// A finish from its channels, filtered or not.
     #[must_use]
-    pub fn finish(diffuse_gloss: [f32; 4], mapped: Option<[f32; 4]>, specular: DVec3) -> Finish {
+    pub fn from_channels(
+        diffuse_roughness: [f32; 4],
+        mapped: Option<[f32; 4]>,
+        specular: DVec3,
+    ) -> SurfaceParams {
         let colour = |[r, g, b, _]: [f32; 4]| DVec3::new(r.into(), g.into(), b.into());
-        Finish {
-            diffuse: colour(diffuse_gloss),
+        SurfaceParams {
+            diffuse: colour(diffuse_roughness),
             specular: mapped.map_or(specular, colour),
-            gloss: SlopeVariance::clamped(diffuse_gloss[3].into()),
+            roughness: SlopeVariance::clamped(diffuse_roughness[3].into()),
         }
     }
 
@@ -57,10 +61,10 @@ impl FinishMap {
     pub(super) fn without_highlight(self) -> Self {
         let Some(specular) = &self.specular else { return self };
         let brighter = |x: usize, y: usize| {
-            let ([r, g, b, gloss], s) = (self.diffuse_gloss.row(y)[x], specular.row(y)[x]);
-            [r.max(s[0]), g.max(s[1]), b.max(s[2]), gloss]
+            let ([r, g, b, roughness], s) = (self.diffuse_roughness.row(y)[x], specular.row(y)[x]);
+            [r.max(s[0]), g.max(s[1]), b.max(s[2]), roughness]
         };
-        Self { diffuse_gloss: Grid::from_fn(specular.size(), brighter).into(), specular: None }
+        Self { diffuse_roughness: Grid::from_fn(specular.size(), brighter).into(), specular: None }
     }
 }
 
@@ -70,12 +74,12 @@ pub struct Material {
     pub name: String,
     /// Its normals and heights.
     pub surface: Arc<dyn Surface>,
-    /// What is the same everywhere; `finish_map`, where there is one, is in its place.
-    pub finish: Finish,
-    /// Colours and gloss of each texel, of the surface's size.
-    pub finish_map: Option<FinishMap>,
+    /// What is the same everywhere; `textures`, where there is one, is in its place.
+    pub params: SurfaceParams,
+    /// Colours and roughness of each texel, of the surface's size.
+    pub textures: Option<SurfaceTextures>,
     /// What of it stands out of its meshes; `None` for a map of normals alone.
-    pub relief: Option<Relief>,
+    pub displacement: Option<Displacement>,
     /// Lobe and model.
-    pub reflection: Reflection,
+    pub brdf: Brdf,
 }

@@ -10,32 +10,31 @@ mod cloth;
 mod creature;
 mod desert;
 mod disk;
+mod displacement;
 mod foil;
 mod material;
 mod mesh;
 mod noise_sphere;
 mod plane;
-mod relief;
 mod sphere;
 pub mod tessellation;
 mod v_groove;
 
 pub use baked::{BakedMaterial, BakedSurface};
 pub use camera::{Camera, Rays};
-pub use material::{FinishMap, Material};
+pub use displacement::Displacement;
+pub use material::{Material, SurfaceTextures};
 pub use mesh::{Mesh, Vertex, area_normals};
-pub use relief::Relief;
 
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use crate::brdf::{self, Argument, Brdf};
+use crate::brdf::{self, Argument, Brdf, Lobe, ShadingModel, SurfaceParams};
 use crate::grid::Size;
 use crate::light::Light;
-use crate::light::environment::Surroundings;
+use crate::light::environment::SceneEnvironment;
 use crate::procedural;
-use crate::reflection::{Finish, Model, Reflection};
 use crate::surface::Surface;
 use crate::units::SlopeVariance;
 
@@ -59,7 +58,7 @@ pub struct Scene {
     /// What it is lit by.
     pub lights: Vec<Light>,
     /// Light from everywhere. It reaches every normal from all directions that face it: what is below the base surface does, too.
-    pub surroundings: Option<Surroundings>,
+    pub environment: Option<SceneEnvironment>,
     /// Radiance where nothing is hit, linear RGB.
     pub background: Vec3,
     /// Display values are sRGB of radiance times this.
@@ -68,7 +67,7 @@ pub struct Scene {
 
 /// How a built-in scene is to be set up.
 #[derive(Clone)]
-pub struct Staging {
+pub struct SceneOptions {
     /// Time, 0 to 1.
     pub time: f64,
     /// Size of built-in maps.
@@ -77,13 +76,13 @@ pub struct Staging {
     pub map: Option<Arc<dyn Surface>>,
 }
 
-impl Default for Staging {
+impl Default for SceneOptions {
     fn default() -> Self {
         Self { time: 0.0, map_size: Size { width: 512, height: 512 }, map: None }
     }
 }
 
-impl Staging {
+impl SceneOptions {
     /// The map of the first material: the one given, or a built-in one.
     fn first_map(&self, own: &str) -> Arc<dyn Surface> {
         self.map.clone().unwrap_or_else(|| self.builtin(own))
@@ -105,7 +104,7 @@ pub struct Row {
     /// What moves as time goes from 0 to 1.
     pub animation: &'static str,
     /// Sets it up.
-    pub build: fn(&Staging) -> Scene,
+    pub build: fn(&SceneOptions) -> Scene,
 }
 
 /// Every built-in scene.
@@ -134,25 +133,25 @@ pub fn find(name: &str) -> Option<&'static Row> {
 impl Scene {
     /// Gives every material this lobe. A diffuse one leaves no highlight: what was specular colour becomes albedo. One that was measured
     /// brings its own colours, and Han et al.'s model, with which it is what was measured.
-    pub fn set_brdf(&mut self, lobe: &dyn Brdf) {
+    pub fn set_brdf(&mut self, lobe: &dyn Lobe) {
         for material in &mut self.materials {
-            material.reflection.lobe = lobe.widen(SlopeVariance::ZERO);
+            material.brdf.lobe = lobe.widen(SlopeVariance::ZERO);
             if let Some(measured) = lobe.measured() {
-                material.finish =
-                    Finish { diffuse: measured.diffuse, specular: DVec3::ONE, ..material.finish };
-                material.finish_map = None;
-                material.reflection.model = Model::Han;
+                material.params =
+                    SurfaceParams { diffuse: measured.diffuse, specular: DVec3::ONE, ..material.params };
+                material.textures = None;
+                material.brdf.shading = ShadingModel::Han;
             }
-            if material.reflection.lobe.argument() == Argument::Light {
-                material.finish.diffuse = material.finish.diffuse.max(material.finish.specular);
-                material.finish_map = material.finish_map.take().map(FinishMap::without_highlight);
+            if material.brdf.lobe.argument() == Argument::Light {
+                material.params.diffuse = material.params.diffuse.max(material.params.specular);
+                material.textures = material.textures.take().map(SurfaceTextures::without_highlight);
             }
         }
     }
 
     /// Gives every material this shading model.
-    pub fn set_model(&mut self, model: Model) {
-        self.materials.iter_mut().for_each(|m| m.reflection.model = model);
+    pub fn set_shading(&mut self, shading: ShadingModel) {
+        self.materials.iter_mut().for_each(|m| m.brdf.shading = shading);
     }
 
     /// Lets maps with heights displace what they lie on: by `scale` times what keeps their slopes, so that 1 is the surface that the map was
@@ -173,15 +172,15 @@ impl Scene {
             let Size { width, height } = material.surface.size();
             let on = |o: &&mut Object| o.material == index;
             let meshes = self.objects.iter().filter(|o| o.material == index).map(|o| &*o.mesh);
-            let width = relief::texture_width(meshes, height as f64 / width as f64);
-            let relief = Relief::new(&*material.surface, width, scale);
+            let width = displacement::texture_width(meshes, height as f64 / width as f64);
+            let displacement = Displacement::new(&*material.surface, width, scale);
             for object in self.objects.iter_mut().filter(on) {
-                object.mesh = object.mesh.with_relief(&relief).into();
+                object.mesh = object.mesh.with_displacement(&displacement).into();
             }
-            material.relief = Some(relief);
-            material.reflection.model = if shadows { Model::Shadowed } else { Model::Masked };
-            if let Some(lobe) = material.reflection.lobe.microfacets() {
-                material.reflection.lobe = Box::new(lobe);
+            material.displacement = Some(displacement);
+            material.brdf.shading = if shadows { ShadingModel::Shadowed } else { ShadingModel::Masked };
+            if let Some(lobe) = material.brdf.lobe.as_beckmann() {
+                material.brdf.lobe = Box::new(lobe);
             }
         }
         if any { Ok(()) } else { Err(NoHeights) }
@@ -192,9 +191,11 @@ impl Scene {
     pub fn displaced_for(&self, camera: &Camera, size: Size) -> Vec<Object> {
         let rays = camera.rays(size);
         let displaced = |object: &Object| {
-            let Some(relief) = &self.materials[object.material].relief else { return object.clone() };
-            let plan = tessellation::plan(&object.mesh, relief, &rays, size);
-            let mesh = tessellation::expand(&object.mesh, relief, &plan, &rays);
+            let Some(displacement) = &self.materials[object.material].displacement else {
+                return object.clone();
+            };
+            let plan = tessellation::plan(&object.mesh, displacement, &rays, size);
+            let mesh = tessellation::expand(&object.mesh, displacement, &plan, &rays);
             Object { mesh: mesh.into(), ..object.clone() }
         };
         self.objects.iter().map(displaced).collect()
@@ -202,8 +203,8 @@ impl Scene {
 
     /// True where some material has relief.
     #[must_use]
-    pub fn has_relief(&self) -> bool {
-        self.materials.iter().any(|m| m.relief.is_some())
+    pub fn is_displaced(&self) -> bool {
+        self.materials.iter().any(|m| m.displacement.is_some())
     }
 
     /// A sphere that holds the scene, around the middle of its box: centre and radius.
@@ -212,8 +213,12 @@ impl Scene {
         let places = || self.objects.iter().flat_map(|o| &o.mesh.vertices).map(|v| v.position);
         let low = places().fold(Vec3::INFINITY, Vec3::min).as_dvec3();
         let high = places().fold(Vec3::NEG_INFINITY, Vec3::max).as_dvec3();
-        let reach =
-            self.materials.iter().filter_map(|m| m.relief.as_ref()).map(|r| r.reach).fold(0.0, f64::max);
+        let reach = self
+            .materials
+            .iter()
+            .filter_map(|m| m.displacement.as_ref())
+            .map(|r| r.reach)
+            .fold(0.0, f64::max);
         if low.x > high.x {
             return (DVec3::ZERO, 1.0);
         }
@@ -232,9 +237,9 @@ fn sun(towards: [f64; 3], irradiance: [f64; 3]) -> Light {
 }
 
 /// A lobe in a model, for the scenes' own spellings.
-fn reflection(model: Model, lobe: &str) -> Reflection {
-    let lobe: Box<dyn Brdf> = brdf::parse(lobe).unwrap_or_else(|e| unreachable!("{e}"));
-    Reflection { lobe, model }
+fn brdf(shading: ShadingModel, lobe: &str) -> Brdf {
+    let lobe: Box<dyn Lobe> = brdf::parse(lobe).unwrap_or_else(|e| unreachable!("{e}"));
+    Brdf { lobe, shading }
 }
 
 /// From `a` to `b` by equal factors, as time goes from 0 to 1.
@@ -247,7 +252,7 @@ mod tests {
     use super::*;
 
     fn scenes() -> impl Iterator<Item = (&'static Row, f64, Scene)> {
-        let staging = |time| Staging { time, map_size: Size { width: 16, height: 16 }, map: None };
+        let staging = |time| SceneOptions { time, map_size: Size { width: 16, height: 16 }, map: None };
         TABLE.iter().flat_map(move |row| [0.0, 0.6, 1.0].map(|time| (row, time, (row.build)(&staging(time)))))
     }
 

@@ -8,16 +8,16 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3, Vec3};
 
 use super::sphere::ball;
-use super::{Camera, Material, Mesh, Object, Row, Scene, Staging, reflection, sun, zoom};
+use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, brdf, sun, zoom};
+use crate::brdf::{ShadingModel, SurfaceParams};
 use crate::grid::Size;
 use crate::procedural::{Grain, sphere_noise};
-use crate::reflection::{Finish, Model};
 use crate::units::SlopeVariance;
 
 /// Deviation of the slopes, displaced at scale 1.
 const DEVIATION: f64 = 0.25;
 
-fn build(staging: &Staging, grain: Grain) -> Scene {
+fn build(staging: &SceneOptions, grain: Grain) -> Scene {
     let mesh = Mesh::from_patch((128, 64), DVec2::ONE, |s, t| ball(s + 0.25, t));
     let Size { width, .. } = staging.map_size;
     // World length of a texture width in the mean over the sphere, as relief takes it: its area is that of half a square texture.
@@ -34,17 +34,17 @@ fn build(staging: &Staging, grain: Grain) -> Scene {
         materials: vec![Material {
             name: "noise".to_owned(),
             surface: staging.map.clone().unwrap_or_else(|| own()),
-            finish: Finish {
+            params: SurfaceParams {
                 diffuse: DVec3::splat(0.75),
                 specular: DVec3::splat(0.04),
-                gloss: SlopeVariance::ZERO,
+                roughness: SlopeVariance::ZERO,
             },
-            finish_map: None,
-            relief: None,
-            reflection: reflection(Model::Masked, "beckmann:0.15"),
+            textures: None,
+            displacement: None,
+            brdf: brdf(ShadingModel::Masked, "beckmann:0.15"),
         }],
         lights: vec![sun([0.0, 0.0, 1.0], [3.0, 3.0, 3.0])],
-        surroundings: None,
+        environment: None,
         background: Vec3::ZERO,
         exposure: 1.0,
     }

@@ -2,14 +2,14 @@
 
 use glam::{DVec2, DVec3, Vec3};
 
-use super::{Camera, Material, Mesh, Object, Row, Scene, Staging, reflection, sun};
-use crate::reflection::{Finish, Model};
+use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, brdf, sun};
+use crate::brdf::{ShadingModel, SurfaceParams};
 use crate::units::SlopeVariance;
 
 /// Half of the plane's side; the map covers two by two.
 const HALF: f64 = 60.0;
 
-fn build(staging: &Staging) -> Scene {
+fn build(staging: &SceneOptions) -> Scene {
     let place = |s: f64, t: f64| DVec3::new((2.0 * s - 1.0) * HALF, 0.0, (1.0 - 2.0 * t) * HALF);
     let mesh = Mesh::from_patch((1, 1), DVec2::splat(HALF), place);
     let ahead = 4.0 * staging.time;
@@ -19,17 +19,17 @@ fn build(staging: &Staging) -> Scene {
         materials: vec![Material {
             name: "plane".to_owned(),
             surface: staging.first_map("foil"),
-            finish: Finish {
+            params: SurfaceParams {
                 diffuse: DVec3::new(0.2, 0.25, 0.32),
                 specular: DVec3::splat(0.06),
-                gloss: SlopeVariance::ZERO,
+                roughness: SlopeVariance::ZERO,
             },
-            finish_map: None,
-            relief: None,
-            reflection: reflection(Model::Smith, "beckmann:0.15"),
+            textures: None,
+            displacement: None,
+            brdf: brdf(ShadingModel::Smith, "beckmann:0.15"),
         }],
         lights: vec![sun([0.1, 0.45, -1.0], [1.6, 1.5, 1.35])],
-        surroundings: None,
+        environment: None,
         background: Vec3::new(0.02, 0.03, 0.05),
         exposure: 1.0,
     }

@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3, Vec3};
 
-use super::{Camera, Material, Mesh, Object, Row, Scene, Staging, reflection, sun, zoom};
-use crate::reflection::{Finish, Model};
+use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, brdf, sun, zoom};
+use crate::brdf::{ShadingModel, SurfaceParams};
 use crate::units::SlopeVariance;
 
 /// A ball of radius 1, its map once around and half as often from pole to pole.
@@ -18,7 +18,7 @@ pub(super) const ROW: Row = Row {
     name: "sphere",
     summary: "one bumpy sphere",
     animation: "the camera moves away, from filling the frame to some forty pixels",
-    build: |staging: &Staging| {
+    build: |staging: &SceneOptions| {
         let mesh = Mesh::from_patch((128, 64), DVec2::new(2.0, 1.0), |s, t| ball(s + 0.25, t));
         let distance = zoom(3.4, 50.0, staging.time);
         Scene {
@@ -27,17 +27,17 @@ pub(super) const ROW: Row = Row {
             materials: vec![Material {
                 name: "ball".to_owned(),
                 surface: staging.first_map("ripples"),
-                finish: Finish {
+                params: SurfaceParams {
                     diffuse: DVec3::new(0.25, 0.05, 0.04),
                     specular: DVec3::splat(0.15),
-                    gloss: SlopeVariance::ZERO,
+                    roughness: SlopeVariance::ZERO,
                 },
-                finish_map: None,
-                relief: None,
-                reflection: reflection(Model::Han, "blinn-phong:100"),
+                textures: None,
+                displacement: None,
+                brdf: brdf(ShadingModel::Han, "blinn-phong:100"),
             }],
             lights: vec![sun([0.5, 0.8, 0.9], [2.5, 2.4, 2.3]), sun([-0.9, 0.1, 0.3], [0.5, 0.6, 0.9])],
-            surroundings: None,
+            environment: None,
             background: Vec3::new(0.015, 0.017, 0.02),
             exposure: 1.0,
         }

@@ -9,7 +9,7 @@
 use glam::{DVec2, DVec3, Mat2, Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::{Mesh, Rays, Relief, Vertex};
+use super::{Displacement, Mesh, Rays, Vertex};
 use crate::grid::Size;
 
 /// Longest edge of a triangle, in pixels. Rounding to powers of two makes most of them half to all of that: with a right angle, triangles
@@ -100,16 +100,16 @@ impl Frustum {
     }
 
     /// Segments that an edge needs.
-    fn segments(&self, a: &Vertex, b: &Vertex, relief: &Relief) -> u32 {
+    fn segments(&self, a: &Vertex, b: &Vertex, displacement: &Displacement) -> u32 {
         let (p, q) = (a.position.as_dvec3(), b.position.as_dvec3());
         let along = q - p;
         let length = along.length();
         let at = ((self.eye - p).dot(along) / (length * length).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
         // The relief may come nearer, but not more than half the way.
         let distance = p.lerp(q, at).distance(self.eye);
-        let distance = (distance - relief.reach).max(distance / 2.0);
+        let distance = (distance - displacement.reach).max(distance / 2.0);
         let pixels = length / (distance * self.pixel).max(f64::MIN_POSITIVE);
-        let finest = relief.heights_size();
+        let finest = displacement.heights_size();
         let texels = (b.uv - a.uv).as_dvec2() * DVec2::new(finest.width as f64, finest.height as f64);
         let wanted = (pixels / EDGE_PIXELS).min(texels.length() * SEGMENTS_PER_TEXEL);
         (wanted.ceil().max(1.0).min(f64::from(MOST_SEGMENTS)) as u32).next_power_of_two()
@@ -118,7 +118,7 @@ impl Frustum {
 
 /// How a mesh with relief is cut for a picture.
 #[must_use]
-pub fn plan(mesh: &Mesh, relief: &Relief, rays: &Rays, size: Size) -> Plan {
+pub fn plan(mesh: &Mesh, displacement: &Displacement, rays: &Rays, size: Size) -> Plan {
     let frustum = Frustum::new(rays, size);
     let edges = |t: &[u32; 3]| {
         let corners = t.map(|i| mesh.vertices[i as usize]);
@@ -126,8 +126,8 @@ pub fn plan(mesh: &Mesh, relief: &Relief, rays: &Rays, size: Size) -> Plan {
         let middle = (p + q + r) / 3.0;
         let radius = [p, q, r].iter().fold(0.0, |most: f64, c| most.max(c.distance(middle)));
         frustum
-            .may_see(middle, radius + relief.reach)
-            .then(|| [0, 1, 2].map(|k| frustum.segments(&corners[k], &corners[(k + 1) % 3], relief)))
+            .may_see(middle, radius + displacement.reach)
+            .then(|| [0, 1, 2].map(|k| frustum.segments(&corners[k], &corners[(k + 1) % 3], displacement)))
     };
     let all: Vec<Option<[u32; 3]>> = mesh.triangles.par_iter().map(edges).collect();
     // Never more than memory has room for, be the eye ever so near: all edges alike are cut less finely.
@@ -216,11 +216,11 @@ fn base_point(corners: &[Vertex; 3], [a, b, c]: [f32; 3]) -> Vertex {
 
 /// The triangles of a plan, displaced, as seen from an eye whose pixels are `pixel` wide at distance 1.
 #[must_use]
-pub fn expand(mesh: &Mesh, relief: &Relief, plan: &Plan, rays: &Rays) -> Mesh {
+pub fn expand(mesh: &Mesh, displacement: &Displacement, plan: &Plan, rays: &Rays) -> Mesh {
     let pixel = rays.right.length();
     let displaced = |base: Vertex| {
         let width = HEIGHT_PIXELS * pixel * base.position.as_dvec3().distance(rays.eye);
-        let height = relief.height(base.uv.as_dvec2(), width);
+        let height = displacement.height(base.uv.as_dvec2(), width);
         Vertex { position: base.position + base.normal * height as f32, ..base }
     };
     grown(mesh, plan, displaced)
@@ -273,7 +273,7 @@ pub(super) fn split(mesh: &Mesh) -> Mesh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{self, Camera, Staging};
+    use crate::scene::{self, Camera, SceneOptions};
     use std::collections::HashMap;
 
     #[test]
@@ -304,20 +304,21 @@ mod tests {
     /// Sphere-like scenes have no open edges: each edge of the displaced mesh must have its opposite, by position.
     #[test]
     fn there_are_no_cracks() {
-        let staging = Staging::default();
+        let staging = SceneOptions::default();
         let mut scene = (scene::find("sphere").unwrap().build)(&staging);
         scene.displace(1.0, false).unwrap();
         let size = Size { width: 1000, height: 1000 };
         // Near one side, so that patches differ as much as they can; all of it in view.
         let camera = Camera::new([0.0, 0.3, 1.4], [0.0, 0.0, 0.0], 120.0);
-        let (mesh, relief) = (&scene.objects[0].mesh, scene.materials[0].relief.as_ref().unwrap());
+        let (mesh, displacement) =
+            (&scene.objects[0].mesh, scene.materials[0].displacement.as_ref().unwrap());
         let rays = camera.rays(size);
-        let plan = plan(mesh, relief, &rays, size);
+        let plan = plan(mesh, displacement, &rays, size);
         let mut counts: Vec<u32> = plan.patches.iter().map(|p| p.segments).collect();
         counts.sort_unstable();
         counts.dedup();
         assert!(counts.len() > 2, "{counts:?}");
-        let displaced = expand(mesh, relief, &plan, &rays);
+        let displaced = expand(mesh, displacement, &plan, &rays);
         // The seam's heights are those of the first and the last column mixed, alike but for a last digit.
         let key = |i: u32| (displaced.vertices[i as usize].position * 1e4).round().as_ivec3().to_array();
         let mut edges: HashMap<([i32; 3], [i32; 3]), i32> = HashMap::new();
@@ -339,11 +340,12 @@ mod tests {
     fn triangles_are_bounded_by_pixels_not_by_the_map() {
         let size = Size { width: 300, height: 300 };
         let count = |map: usize, time: f64| {
-            let staging = Staging { time, map_size: Size { width: map, height: map }, ..Staging::default() };
+            let staging =
+                SceneOptions { time, map_size: Size { width: map, height: map }, ..SceneOptions::default() };
             let mut scene = (scene::find("armour").unwrap().build)(&staging);
             scene.displace(1.0, false).unwrap();
-            let relief = scene.materials[0].relief.as_ref().unwrap();
-            plan(&scene.objects[0].mesh, relief, &scene.camera.rays(size), size).triangles
+            let displacement = scene.materials[0].displacement.as_ref().unwrap();
+            plan(&scene.objects[0].mesh, displacement, &scene.camera.rays(size), size).triangles
         };
         // The near view fills the picture: twice its pixels over four are the front and the back, foreshortened on the way round.
         assert!(count(512, 0.0) < 300 * 300, "{}", count(512, 0.0));

@@ -2,15 +2,15 @@
 
 use glam::{DVec2, DVec3, Vec3};
 
-use super::{Camera, Material, Mesh, Object, Row, Scene, Staging, reflection, sun};
-use crate::reflection::{Finish, Model};
+use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, brdf, sun};
+use crate::brdf::{ShadingModel, SurfaceParams};
 use crate::units::SlopeVariance;
 
 pub(super) const ROW: Row = Row {
     name: "v-groove",
     summary: "straight grooves on a square, the simplest two-lobed surface",
     animation: "the light sweeps across the grooves",
-    build: |staging: &Staging| {
+    build: |staging: &SceneOptions| {
         let mesh = Mesh::from_patch((1, 1), DVec2::ONE, |s, t| DVec3::new(2.0 * s - 1.0, 2.0 * t - 1.0, 0.0));
         Scene {
             camera: Camera::new([0.0, 0.0, 4.0], [0.0, 0.0, 0.0], 35.0),
@@ -18,17 +18,17 @@ pub(super) const ROW: Row = Row {
             materials: vec![Material {
                 name: "grooves".to_owned(),
                 surface: staging.first_map("v-groove"),
-                finish: Finish {
+                params: SurfaceParams {
                     diffuse: DVec3::splat(0.1),
                     specular: DVec3::splat(0.2),
-                    gloss: SlopeVariance::ZERO,
+                    roughness: SlopeVariance::ZERO,
                 },
-                finish_map: None,
-                relief: None,
-                reflection: reflection(Model::Han, "blinn-phong:60"),
+                textures: None,
+                displacement: None,
+                brdf: brdf(ShadingModel::Han, "blinn-phong:60"),
             }],
             lights: vec![sun([3.0 * staging.time - 1.5, 0.2, 1.0], [1.0, 1.0, 1.0])],
-            surroundings: None,
+            environment: None,
             background: Vec3::splat(0.01),
             exposure: 1.0,
         }

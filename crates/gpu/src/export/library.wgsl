@@ -1,5 +1,5 @@
 // What other programs call. `ndf_shade` looks a place of the map up and shades it; `ndf_shade_channels` shades channels that were
-// looked up otherwise. `ndf_reflection` is the lobe and its model.
+// looked up otherwise. `ndf_brdf` is the lobe and its model.
 
 // A place to be shaded, in its tangent frame: x along u, y against v (v runs down the rows), z out of the surface.
 struct NdfPlace {
@@ -19,6 +19,6 @@ fn ndf_shade_channels(channels: ptr<function, Channels>, place: NdfPlace) -> vec
         return vec3<f32>(0.0);
     }
     var decoded = decode(channels);
-    let finish = Finish(place.diffuse, 0.0, place.specular);
-    return reflect_texel(channels, &decoded, finish, ndf_reflection(), way_between(place.wi, place.wo));
+    let params = SurfaceParams(place.diffuse, 0.0, place.specular);
+    return reflect_texel(channels, &decoded, params, ndf_brdf(), directions_between(place.wi, place.wo));
 }

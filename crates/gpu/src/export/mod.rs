@@ -8,8 +8,8 @@ use std::fmt::Write as _;
 
 use naga::back;
 use naga::compact::{KeepUnused, compact};
+use ndfmap_core::brdf::Brdf;
 use ndfmap_core::ndf::Method;
-use ndfmap_core::reflection::Reflection;
 use ndfmap_core::shader::{self, LOOKUP};
 use ndfmap_core::units::SlopeVariance;
 
@@ -74,7 +74,7 @@ pub struct Export<'a> {
     /// The method, whose baked map the shader reads.
     pub method: &'a dyn Method,
     /// Lobe and model.
-    pub reflection: &'a Reflection,
+    pub brdf: &'a Brdf,
 }
 
 impl Export<'_> {
@@ -100,22 +100,22 @@ impl Export<'_> {
 
     /// The linked text of the library, without an entry point.
     fn library(&self) -> String {
-        let lobe = &*self.reflection.lobe;
+        let lobe = &*self.brdf.lobe;
         let (least, most) = (SlopeVariance::ZERO, SlopeVariance::ZERO);
-        let table = self.method.shader_table(self.reflection, least, most);
+        let table = self.method.shader_table(self.brdf, least, most);
         let entry = |(i, entry): (usize, &[f32; 12])| {
             let (first, last, lobe, diffuse) = (3 * i, 3 * i + 2, entry[0], entry[11]);
             format!(
-                "    reflection.table[{first}].x = {lobe:?};\n    reflection.table[{last}].w = {diffuse:?};\n"
+                "    brdf.table[{first}].x = {lobe:?};\n    brdf.table[{last}].w = {diffuse:?};\n"
             )
         };
-        let reflection = format!(
-            "// The lobe {}, in the model `{}`.\nfn ndf_reflection() -> Reflection {{\n    var reflection: Reflection;\n    \
-             reflection.base = {:?};\n    reflection.model = {}u;\n{}    return reflection;\n}}\n",
+        let brdf = format!(
+            "// The lobe {}, in the model `{}`.\nfn ndf_brdf() -> Brdf {{\n    var brdf: Brdf;\n    \
+             brdf.base = {:?};\n    brdf.shading = {}u;\n{}    return brdf;\n}}\n",
             lobe.spelling(),
-            self.reflection.model.name(),
+            self.brdf.shading.name(),
             lobe.base() as f32,
-            self.reflection.model.index(),
+            self.brdf.shading.index(),
             table.iter().enumerate().map(entry).collect::<String>()
         );
         let method = shader::link(self.method, lobe, 0);
@@ -126,7 +126,7 @@ impl Export<'_> {
         } else {
             (LOOKUP, include_str!("texels.wgsl"))
         };
-        [&method, lookup, &reflection, library, own].join("\n")
+        [&method, lookup, &brdf, library, own].join("\n")
     }
 
     /// What the file begins with.
@@ -137,9 +137,9 @@ impl Export<'_> {
             "any sampler: this method reads texels one by one, of a map that repeats"
         };
         let (layers, method) = (self.method.layers(), self.method.spelling());
-        let (lobe, model) = (self.reflection.lobe.spelling(), self.reflection.model.name());
+        let (lobe, shading) = (self.brdf.lobe.spelling(), self.brdf.shading.name());
         format!(
-            "Normal distribution map, method {method}, lobe {lobe}, model {model}. Made by ndfmap {}.\n\
+            "Normal distribution map, method {method}, lobe {lobe}, model {shading}. Made by ndfmap {}.\n\
              \n\
              Bind the map that `ndfmap bake --method {method}` made as a 2-D array texture of {layers} layers, half floats, with all\n\
              its levels and no sRGB decoding, and {sampler}. Then call\n\

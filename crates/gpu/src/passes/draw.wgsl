@@ -2,29 +2,29 @@
 
 @group(1) @binding(0) var<uniform> material: Material;
 @group(1) @binding(1) var map: texture_2d_array<f32>;
-@group(1) @binding(2) var finish_map: texture_2d_array<f32>;
+@group(1) @binding(2) var params_map: texture_2d_array<f32>;
 @group(1) @binding(3) var linear: sampler;
 
 // What a place is made of, where lobes do not say so themselves.
-fn plain_finish(diffuse_gloss: vec4<f32>, specular: vec4<f32>) -> Finish {
-    var finish = material.plain;
+fn material_params(diffuse_roughness: vec4<f32>, specular: vec4<f32>) -> SurfaceParams {
+    var params = material.plain;
     if material.mapped > 0u {
-        finish.diffuse = diffuse_gloss.xyz;
-        finish.gloss = max(diffuse_gloss.w, 0.0);
+        params.diffuse = diffuse_roughness.xyz;
+        params.roughness = max(diffuse_roughness.w, 0.0);
     }
     if material.mapped > 1u {
-        finish.specular = specular.xyz;
+        params.specular = specular.xyz;
     }
-    return finish;
+    return params;
 }
 
 // The light of all lights from a texel.
-fn shade(place: Place, channels: ptr<function, Channels>, plain: Finish) -> vec3<f32> {
+fn shade(place: Place, channels: ptr<function, Channels>, plain: SurfaceParams) -> vec3<f32> {
     var decoded = decode(channels);
     var sum = vec3<f32>(0.0);
     // A facet of relief may face what its base turns its back on.
-    let relief = DISPLACES && place.relief;
-    if place.wo.z <= 0.0 && !relief {
+    let displaced = DISPLACES && place.displaced;
+    if place.wo.z <= 0.0 && !displaced {
         return sum;
     }
     for (var i = 0u; i < view.lights; i++) {
@@ -34,17 +34,17 @@ fn shade(place: Place, channels: ptr<function, Channels>, plain: Finish) -> vec3
         if dot(across, across) < 1e-12 {
             continue;
         }
-        let way = way_between(light.wi, place.wo);
-        if relief {
-            let light_of = reflect_displaced(channels, &decoded, plain, material.reflection, way, place.stretch);
+        let directions = directions_between(light.wi, place.wo);
+        if displaced {
+            let light_of = reflect_displaced(channels, &decoded, plain, material.brdf, directions, place.stretch);
             sum += light.irradiance * light_of;
         } else if light.wi.z > 0.0 || light.from_below {
-            sum += light.irradiance * reflect_texel(channels, &decoded, plain, material.reflection, way);
+            sum += light.irradiance * reflect_texel(channels, &decoded, plain, material.brdf, directions);
         }
     }
     if environment.technique > 0u {
-        let around = Around(environment.turn * place.frame, place.wo, relief, place.stretch);
-        sum += reflect_surround(channels, &decoded, plain, material.reflection, around);
+        let around = LocalEnvironment(environment.rotation * place.frame, place.wo, displaced, place.stretch);
+        sum += reflect_environment(channels, &decoded, plain, material.brdf, around);
     }
     return sum;
 }
@@ -55,15 +55,15 @@ fn taps_of(place: Place) -> Taps {
 }
 
 // Colours by the filter's taps.
-fn filtered_finish(around: Taps) -> Finish {
+fn filtered_params(around: Taps) -> SurfaceParams {
     var colours = array<vec4<f32>, 2>();
     let share = 1.0 / f32(around.columns * around.rows);
     for (var k = 0u; k < min(material.mapped, 2u); k++) {
         for (var i = 0u; i < around.columns * around.rows; i++) {
-            colours[k] += share * trilinear(finish_map, linear, tap(around, i), k, around.lod);
+            colours[k] += share * trilinear(params_map, linear, tap(around, i), k, around.lod);
         }
     }
-    return plain_finish(colours[0], colours[1]);
+    return material_params(colours[0], colours[1]);
 }
 
 // A colour that the target can hold: half floats would make infinity of what a sharp lobe reflects.
@@ -90,7 +90,7 @@ fn filtered(in: Varying) -> @location(0) vec4<f32> {
     for (var layer = 0u; layer < ALL_LAYERS; layer++) {
         channels[layer] /= f32(count);
     }
-    return held(shade(place, &channels, filtered_finish(around)));
+    return held(shade(place, &channels, filtered_params(around)));
 }
 
 // The sampler's own choice of levels and taps.
@@ -106,9 +106,9 @@ fn sampled(in: Varying) -> @location(0) vec4<f32> {
     }
     var colours = array<vec4<f32>, 2>();
     for (var k = 0u; k < min(material.mapped, 2u); k++) {
-        colours[k] = textureSampleGrad(finish_map, linear, place.uv, k, place.duv_dx, place.duv_dy);
+        colours[k] = textureSampleGrad(params_map, linear, place.uv, k, place.duv_dx, place.duv_dy);
     }
-    return held(shade(place, &channels, plain_finish(colours[0], colours[1])));
+    return held(shade(place, &channels, material_params(colours[0], colours[1])));
 }
 
 // Every texel that the filter reads is shaded by itself: for what must not be mixed, or is not aligned.
@@ -119,7 +119,7 @@ fn neighbours(in: Varying) -> @location(0) vec4<f32> {
     }
     let place = place_of(in, DISPLACES);
     let around = taps_of(place);
-    let plain = filtered_finish(around);
+    let plain = filtered_params(around);
     let repeat = vec2<bool>((material.repeat & 1u) != 0u, (material.repeat & 2u) != 0u);
     let count = around.columns * around.rows;
     var sum = vec3<f32>(0.0);

@@ -1,12 +1,12 @@
 // What the passes that shade know of a material, the same for all its pixels.
 
 struct Material {
-    plain: Finish,
+    plain: SurfaceParams,
     // Texels of the finest level.
     texels: vec2<f32>,
-    // Colours in `finish`: 0 none, 1 albedo and gloss, 2 specular colour as well.
+    // Colours in `params`: 0 none, 1 albedo and roughness, 2 specular colour as well.
     mapped: u32,
     // Which axes repeat: 1 the first, 2 the second.
     repeat: u32,
-    reflection: Reflection,
+    brdf: Brdf,
 }

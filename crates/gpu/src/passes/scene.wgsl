@@ -80,7 +80,7 @@ struct Place {
     duv_dx: vec2<f32>,
     duv_dy: vec2<f32>,
     // On a mesh with relief, how slopes of the map lie in the frame.
-    relief: bool,
+    displaced: bool,
     stretch: mat2x2<f32>,
 }
 
@@ -107,8 +107,8 @@ fn place_of(in: Varying, unbent: bool) -> Place {
     var normal = normalize(in.normal) * side;
     // Where the normal between corners has turned away from the eye, it is bent back until it just does not.
     let facing = -dot(normal, direction);
-    let relief = triangle.grad_u.w == 1.0;
-    if facing < LEAST_FACING && !(unbent && relief) {
+    let displaced = triangle.grad_u.w == 1.0;
+    if facing < LEAST_FACING && !(unbent && displaced) {
         normal = normalize(normal - direction * (LEAST_FACING - facing));
     }
     let across = reject(in.tangent, normal);
@@ -127,25 +127,25 @@ fn place_of(in: Varying, unbent: bool) -> Place {
         in.uv,
         vec2<f32>(dot(triangle.grad_u.xyz, dx), dot(triangle.grad_v.xyz, dx)),
         vec2<f32>(dot(triangle.grad_u.xyz, dy), dot(triangle.grad_v.xyz, dy)),
-        relief,
+        displaced,
         // From behind, what stands out goes in, along the turned frame.
         mat2x2<f32>(side * in.stretch.x, in.stretch.y, side * in.stretch.z, in.stretch.w),
     );
 }
 
 // A light as a place sees it: unit vector to it in the tangent frame, and its irradiance.
-struct Seen {
+struct IncidentLight {
     wi: vec3<f32>,
     irradiance: vec3<f32>,
     from_below: bool,
 }
 
-fn seen_from(place: Place, i: u32) -> Seen {
+fn seen_from(place: Place, i: u32) -> IncidentLight {
     let light = lights[i];
     if light.place.w == 0.0 {
-        return Seen(light.place.xyz * place.frame, light.power.xyz, light.power.w == 1.0);
+        return IncidentLight(light.place.xyz * place.frame, light.power.xyz, light.power.w == 1.0);
     }
-    let way = light.place.xyz - place.position;
-    let square = max(dot(way, way), 1e-12);
-    return Seen(way * inverseSqrt(square) * place.frame, light.power.xyz / square, false);
+    let to_light = light.place.xyz - place.position;
+    let square = max(dot(to_light, to_light), 1e-12);
+    return IncidentLight(to_light * inverseSqrt(square) * place.frame, light.power.xyz / square, false);
 }

@@ -3,7 +3,7 @@
 
 @group(1) @binding(0) var<uniform> material: Material;
 @group(1) @binding(1) var normals: texture_2d<f32>;
-@group(1) @binding(2) var finish_map: texture_2d_array<f32>;
+@group(1) @binding(2) var params_map: texture_2d_array<f32>;
 
 // A number that is as good as random for each pixel and sample (the permuted congruential generator of O'Neill 2014, as a hash).
 fn hash(v: u32) -> u32 {
@@ -33,22 +33,22 @@ fn truth(in: Varying) -> @location(0) vec4<f32> {
     let x = wrapped(at.x, material.texels.x, (material.repeat & 1u) != 0u);
     let y = wrapped(at.y, material.texels.y, (material.repeat & 2u) != 0u);
     let n = textureLoad(normals, vec2<i32>(x, y), 0).xyz;
-    var finish = material.plain;
+    var params = material.plain;
     if material.mapped > 0u {
-        let diffuse_gloss = textureLoad(finish_map, vec2<i32>(x, y), 0, 0);
-        finish.diffuse = diffuse_gloss.xyz;
-        finish.gloss = max(diffuse_gloss.w, 0.0);
+        let diffuse_roughness = textureLoad(params_map, vec2<i32>(x, y), 0, 0);
+        params.diffuse = diffuse_roughness.xyz;
+        params.roughness = max(diffuse_roughness.w, 0.0);
     }
     if material.mapped > 1u {
-        finish.specular = textureLoad(finish_map, vec2<i32>(x, y), 1, 0).xyz;
+        params.specular = textureLoad(params_map, vec2<i32>(x, y), 1, 0).xyz;
     }
     var sum = vec3<f32>(0.0);
     if place.wo.z > 0.0 {
         for (var i = 0u; i < view.lights; i++) {
             let light = seen_from(place, i);
             if light.wi.z > 0.0 {
-                let way = way_between(light.wi, place.wo);
-                sum += light.irradiance * facet(material.reflection, n, finish, way);
+                let directions = directions_between(light.wi, place.wo);
+                sum += light.irradiance * facet(material.brdf, n, params, directions);
             }
         }
     }

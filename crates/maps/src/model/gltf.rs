@@ -12,10 +12,10 @@ use std::sync::Arc;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use glam::{DVec3, Mat3, Mat4, Vec2, Vec3, Vec4};
+use ndfmap_core::brdf::SurfaceParams;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::lookup::area_mean;
-use ndfmap_core::reflection::Finish;
-use ndfmap_core::scene::{FinishMap, Material};
+use ndfmap_core::scene::{Material, SurfaceTextures};
 use ndfmap_core::surface::{Surface, SurfaceRow, Wrap, Wraps, unit_or_up};
 use ndfmap_core::units::{Alpha, PerceptualRoughness, SlopeVariance};
 
@@ -220,72 +220,77 @@ impl Files<'_> {
                 "textures of `{name}` have other coordinates than its normal map, and are laid on by its own"
             ));
         }
-        let factors = Factors {
+        let factors = MaterialFactors {
             base: pbr.base_color_factor(),
             metallic: pbr.metallic_factor(),
             roughness: pbr.roughness_factor(),
         };
-        let (finish, roughness) = factors.finish([1.0; 4], [1.0; 4]);
+        let (params, roughness) = factors.params([1.0; 4], [1.0; 4]);
         if base.is_none() && metal_rough.is_none() {
-            let finish = Finish { gloss: SlopeVariance::ZERO, ..finish };
+            let params = SurfaceParams { roughness: SlopeVariance::ZERO, ..params };
             return Ok(Material {
                 name,
                 surface,
-                finish,
-                finish_map: None,
-                relief: None,
-                reflection: microfacets(roughness * roughness),
+                params,
+                textures: None,
+                displacement: None,
+                brdf: microfacets(roughness * roughness),
             });
         }
         let size = surface.size();
         let sample = |map: &Option<Grid<[f32; 4]>>, x: usize, y: usize| {
             map.as_ref().map_or([1.0; 4], |map| area_mean(map, size, x, y))
         };
-        let at = |x: usize, y: usize| factors.finish(sample(&base, x, y), sample(&metal_rough, x, y)).0;
+        let at = |x: usize, y: usize| factors.params(sample(&base, x, y), sample(&metal_rough, x, y)).0;
         let rgb = |c: DVec3, w: f64| [c.x as f32, c.y as f32, c.z as f32, w as f32];
-        let diffuse_gloss = Grid::from_fn(size, |x, y| {
-            let finish = at(x, y);
-            rgb(finish.diffuse, finish.gloss.get())
+        let diffuse_roughness = Grid::from_fn(size, |x, y| {
+            let params = at(x, y);
+            rgb(params.diffuse, params.roughness.get())
         });
         let specular = Grid::from_fn(size, |x, y| rgb(at(x, y).specular, 1.0));
-        let finish = mean_finish(&diffuse_gloss, &specular);
-        let finish_map =
-            Some(FinishMap { diffuse_gloss: diffuse_gloss.into(), specular: Some(specular.into()) });
+        let params = mean_params(&diffuse_roughness, &specular);
+        let textures = Some(SurfaceTextures {
+            diffuse_roughness: diffuse_roughness.into(),
+            specular: Some(specular.into()),
+        });
         // The lobe itself is as sharp as can be; all its width is in the map.
-        Ok(Material { name, surface, finish, finish_map, relief: None, reflection: microfacets(0.0) })
+        Ok(Material { name, surface, params, textures, displacement: None, brdf: microfacets(0.0) })
     }
 }
 
 /// The mean over a map, for when the map is taken away.
-fn mean_finish(diffuse_gloss: &Grid<[f32; 4]>, specular: &Grid<[f32; 4]>) -> Finish {
+fn mean_params(diffuse_roughness: &Grid<[f32; 4]>, specular: &Grid<[f32; 4]>) -> SurfaceParams {
     let mean = |map: &Grid<[f32; 4]>, c: usize| {
         map.texels().iter().map(|t| f64::from(t[c])).sum::<f64>() / map.texels().len() as f64
     };
-    Finish {
-        diffuse: DVec3::from([0, 1, 2].map(|c| mean(diffuse_gloss, c))),
+    SurfaceParams {
+        diffuse: DVec3::from([0, 1, 2].map(|c| mean(diffuse_roughness, c))),
         specular: DVec3::from([0, 1, 2].map(|c| mean(specular, c))),
-        gloss: SlopeVariance::clamped(mean(diffuse_gloss, 3)),
+        roughness: SlopeVariance::clamped(mean(diffuse_roughness, 3)),
     }
 }
 
 /// A material's constant factors.
-struct Factors {
+struct MaterialFactors {
     base: [f32; 4],
     metallic: f32,
     roughness: f32,
 }
 
-impl Factors {
+impl MaterialFactors {
     /// The finish under texture values, and its roughness (glTF 2.0, appendix B).
-    fn finish(&self, base: [f32; 4], metal_rough: [f32; 4]) -> (Finish, f64) {
+    fn params(&self, base: [f32; 4], metal_rough: [f32; 4]) -> (SurfaceParams, f64) {
         let base = DVec3::from([0, 1, 2].map(|i| f64::from(self.base[i] * base[i])));
         let metal = f64::from(self.metallic * metal_rough[2]).clamp(0.0, 1.0);
         let roughness = f64::from(self.roughness * metal_rough[1]).clamp(LEAST_ROUGHNESS, 1.0);
         let alpha = PerceptualRoughness::new(roughness).map(Alpha::from);
-        let gloss = alpha.map_or(SlopeVariance::ZERO, SlopeVariance::from);
-        let finish =
-            Finish { diffuse: base * (1.0 - metal), specular: DVec3::splat(0.04).lerp(base, metal), gloss };
-        (finish, roughness)
+        let variance = alpha.map_or(SlopeVariance::ZERO, SlopeVariance::from);
+        let params = SurfaceParams {
+            diffuse: base * (1.0 - metal),
+            specular: DVec3::splat(0.04).lerp(base, metal),
+            roughness: variance,
+        };
+        (params, roughness)
     }
 }
 
@@ -353,9 +358,9 @@ impl Walk<'_> {
             ));
         }
         let reader = primitive.reader(|buffer| self.files.buffers.get(buffer.index()).map(|b| &**b));
-        let turn = Mat3::from_mat4(pose);
-        let lasting = turn.inverse().transpose();
-        let mirrored = turn.determinant() < 0.0;
+        let rotation = Mat3::from_mat4(pose);
+        let normal_matrix = rotation.inverse().transpose();
+        let mirrored = rotation.determinant() < 0.0;
         let positions: Vec<Vec3> = reader
             .read_positions()
             .ok_or_else(|| MapError::invalid(path, "has a mesh without positions, or outside its buffer"))?
@@ -385,8 +390,10 @@ impl Walk<'_> {
             None => uv.into(),
         };
         let sign = if mirrored { -1.0 } else { 1.0 };
-        let normals: Vec<Vec3> =
-            reader.read_normals().map(|n| n.map(|n| lasting * Vec3::from(n)).collect()).unwrap_or_default();
+        let normals: Vec<Vec3> = reader
+            .read_normals()
+            .map(|n| n.map(|n| normal_matrix * Vec3::from(n)).collect())
+            .unwrap_or_default();
         // Tangents without normals belong to normals that are not there, and are made anew with them.
         let tangents = reader.read_tangents().filter(|_| !normals.is_empty());
         Ok(RawMesh {
@@ -397,7 +404,7 @@ impl Walk<'_> {
                 .map(|t| {
                     let turned = |t: [f32; 4]| {
                         let t = Vec4::from(t);
-                        (turn * t.truncate()).extend(sign * t.w)
+                        (rotation * t.truncate()).extend(sign * t.w)
                     };
                     t.map(turned).collect()
                 })

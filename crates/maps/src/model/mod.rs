@@ -13,11 +13,10 @@ use std::sync::Arc;
 
 use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
 use glam::{DVec3, Vec2, Vec3, Vec4};
-use ndfmap_core::brdf::{Brdf, Ggx};
+use ndfmap_core::brdf::{Brdf, Ggx, Lobe, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
-use ndfmap_core::reflection::{Finish, Model, Reflection};
-use ndfmap_core::scene::{Camera, Material, Mesh, Object, Scene, Staging, Vertex, area_normals};
+use ndfmap_core::scene::{Camera, Material, Mesh, Object, Scene, SceneOptions, Vertex, area_normals};
 use ndfmap_core::surface::{NormalGrid, Surface, Wraps};
 use ndfmap_core::units::{Alpha, SlopeVariance};
 
@@ -42,7 +41,7 @@ pub static TABLE: &[ModelFormat] = &[gltf::FORMAT, obj::FORMAT, ply::FORMAT];
 /// How to take a model.
 pub struct ModelOptions {
     /// A map for the first material, in place of its own; the time is ignored.
-    pub staging: Staging,
+    pub staging: SceneOptions,
 }
 
 /// Meshes and what they are made of.
@@ -132,7 +131,7 @@ fn scene_of(
     }
     if let Some(map) = &options.staging.map {
         parts.materials[0].surface = Arc::clone(map);
-        if parts.materials[0].finish_map.take().is_some() {
+        if parts.materials[0].textures.take().is_some() {
             warnings.push(
                 "its first material's textures go with its own normal map, and are left out".to_owned(),
             );
@@ -152,7 +151,7 @@ fn scene_of(
         objects,
         materials: parts.materials,
         lights: vec![sun([0.5, 0.8, 0.9], [2.8, 2.7, 2.5]), sun([-0.9, 0.3, 0.4], [0.7, 0.8, 1.0])],
-        surroundings: None,
+        environment: None,
         background: Vec3::new(0.02, 0.022, 0.026),
         exposure: 1.0,
     };
@@ -174,22 +173,22 @@ fn plain() -> Material {
     Material {
         name: "plain".to_owned(),
         surface: flat(Size { width: 1, height: 1 }),
-        finish: Finish {
+        params: SurfaceParams {
             diffuse: DVec3::splat(0.3),
             specular: DVec3::splat(0.12),
-            gloss: SlopeVariance::ZERO,
+            roughness: SlopeVariance::ZERO,
         },
-        finish_map: None,
-        relief: None,
-        reflection: microfacets(0.25),
+        textures: None,
+        displacement: None,
+        brdf: microfacets(0.25),
     }
 }
 
 /// GGX in Smith's model; `alpha` is held to what the lobe takes.
-fn microfacets(alpha: f64) -> Reflection {
+fn microfacets(alpha: f64) -> Brdf {
     let alpha = Alpha::new(alpha.clamp(1e-4, 1.0)).unwrap_or_else(|e| unreachable!("{e}"));
-    let lobe: Box<dyn Brdf> = Box::new(Ggx::new(alpha));
-    Reflection { lobe, model: Model::Smith }
+    let lobe: Box<dyn Lobe> = Box::new(Ggx::new(alpha));
+    Brdf { lobe, shading: ShadingModel::Smith }
 }
 
 impl RawMesh {

@@ -3,14 +3,12 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use ndfmap_core::brdf::{self, Brdf, Factors, ParseBrdfError};
+use ndfmap_core::brdf::{self, Lobe, LobeFactors, ParseLobeError, ShadingModel};
 use ndfmap_core::grid::Size;
-use ndfmap_core::light::environment::{Surroundings, Technique, builtin};
+use ndfmap_core::light::environment::{SceneEnvironment, Technique, builtin};
 use ndfmap_core::ndf::{self, Method, ParseMethodError};
-use ndfmap_core::pyramid;
-use ndfmap_core::reflection::Model;
-use ndfmap_core::scene;
 use ndfmap_core::surface::{SlopeFilter, Wrap, Wraps};
+use ndfmap_core::{pyramid, scene};
 use ndfmap_maps::SourceKind;
 use ndfmap_maps::environment::read_environment;
 use ndfmap_maps::merl::read_merl;
@@ -18,7 +16,7 @@ use ndfmap_maps::model::is_model;
 use ndfmap_maps::source::{Convention, DEFAULT_HEIGHT_SCALE, SourceOptions};
 use serde_json::json;
 
-use crate::staging::TurningEnvironment;
+use crate::staging::RotatingEnvironment;
 
 /// How to take the source map.
 #[derive(Debug, Args)]
@@ -133,13 +131,13 @@ pub(super) struct EnvironmentArguments {
 
 impl EnvironmentArguments {
     /// Reads and prepares it.
-    pub(super) fn read(&self) -> Result<Option<TurningEnvironment>, crate::Failure> {
+    pub(super) fn read(&self) -> Result<Option<RotatingEnvironment>, crate::Failure> {
         let Some(path) = &self.environment else { return Ok(None) };
         let (environment, warnings) = read_environment(path)?;
         warnings.iter().for_each(|w| super::warn(path, w));
-        let surroundings =
-            Surroundings { technique: self.environment_light, ..Surroundings::new(environment) };
-        let suns = &surroundings.filtered.suns;
+        let environment =
+            SceneEnvironment { technique: self.environment_light, ..SceneEnvironment::new(environment) };
+        let suns = &environment.filtered.suns;
         if !suns.lights.is_empty() {
             let (count, percent) = (suns.lights.len(), 100.0 * suns.share);
             let name = path.display();
@@ -147,21 +145,21 @@ impl EnvironmentArguments {
                 "ndfmap: {name}: {count} small bright source(s), {percent:.1} % of its light, shine as lights of their own"
             );
         }
-        Ok(Some(TurningEnvironment {
-            surroundings,
-            turn: self.turn.unwrap_or_default().map(f64::to_radians),
+        Ok(Some(RotatingEnvironment {
+            environment,
+            rotation: self.turn.unwrap_or_default().map(f64::to_radians),
         }))
     }
 }
 
 impl EnvironmentArguments {
     /// What a script may want to know of it.
-    pub(super) fn to_json(&self, read: &TurningEnvironment) -> serde_json::Value {
-        let suns = &read.surroundings.filtered.suns;
+    pub(super) fn to_json(&self, read: &RotatingEnvironment) -> serde_json::Value {
+        let suns = &read.environment.filtered.suns;
         json!({
             "file": self.environment,
             "technique": self.environment_light.name(),
-            "turn": read.turn.map(f64::to_degrees),
+            "turn": read.rotation.map(f64::to_degrees),
             "suns": suns.lights.len(),
             "suns_share": suns.share,
         })
@@ -250,7 +248,7 @@ pub(super) fn brdf_spelling(text: &str) -> Result<String, String> {
     }
     match brdf::parse(text) {
         Ok(_) => Ok(text.to_owned()),
-        Err(ParseBrdfError::Unknown(name)) => {
+        Err(ParseLobeError::Unknown(name)) => {
             Err(unknown(&name, brdf::TABLE.iter().map(|r| r.name).chain(["merl"])))
         }
         Err(other) => Err(other.to_string()),
@@ -258,8 +256,8 @@ pub(super) fn brdf_spelling(text: &str) -> Result<String, String> {
 }
 
 /// The lobe of a checked spelling. Of one that was measured it is said what its factors leave.
-pub(super) fn read_brdf(spelling: &str) -> Result<Box<dyn Brdf>, crate::Failure> {
-    let lobe: Box<dyn Brdf> = match spelling.strip_prefix(MERL) {
+pub(super) fn read_brdf(spelling: &str) -> Result<Box<dyn Lobe>, crate::Failure> {
+    let lobe: Box<dyn Lobe> = match spelling.strip_prefix(MERL) {
         Some(file) => {
             let (lobe, missing) = read_merl(file.as_ref())?;
             if missing > 0 {
@@ -272,7 +270,7 @@ pub(super) fn read_brdf(spelling: &str) -> Result<Box<dyn Brdf>, crate::Failure>
         }
         None => brdf::parse(spelling).map_err(|e| crate::Failure::Usage(e.to_string()))?,
     };
-    if let Some(Factors { residual, kernels, .. }) = lobe.measured() {
+    if let Some(LobeFactors { residual, kernels, .. }) = lobe.measured() {
         let [factored, fitted] = [residual.factored, residual.fitted].map(|left| 100.0 * left);
         eprintln!(
             "ndfmap: {spelling}: kd + f(theta_h) g(theta_d) leaves {factored:.1} % of the table, and f as {} kernels {fitted:.1} %",
@@ -333,7 +331,10 @@ pub(super) fn method(spelling: &str) -> Result<Box<dyn Method>, crate::Failure> 
 }
 
 /// Reads the name of a shading model.
-pub(super) fn model(text: &str) -> Result<Model, String> {
-    let names = Model::ALL.map(Model::name).join(", ");
-    Model::ALL.into_iter().find(|m| m.name() == text).ok_or_else(|| format!("`{text}` is none of {names}"))
+pub(super) fn model(text: &str) -> Result<ShadingModel, String> {
+    let names = ShadingModel::ALL.map(ShadingModel::name).join(", ");
+    ShadingModel::ALL
+        .into_iter()
+        .find(|m| m.name() == text)
+        .ok_or_else(|| format!("`{text}` is none of {names}"))
 }

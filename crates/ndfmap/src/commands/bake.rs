@@ -155,7 +155,7 @@ impl Bake {
         let brdf = read_brdf(&self.brdf)?;
         let asked = Auto {
             surface: &*map.surface,
-            brdf: &*brdf,
+            lobe: &*brdf,
             precision: self.precision.into(),
             lobes_only: !self.attribute.is_empty(),
         };

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
-use ndfmap_core::brdf::Brdf;
+use ndfmap_core::brdf::Lobe;
 use ndfmap_core::grid::Size;
 use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid;
@@ -20,10 +20,10 @@ use super::render::{DisplaceArguments, FilterArguments, check_drift};
 use super::{print, print_json, say_if_replaced, warn};
 use crate::Failure;
 use crate::engine::Cpu;
-use crate::imaging::{Reel, Shot, shoot};
+use crate::imaging::{RenderJob, RenderReport, shoot};
 use crate::measure::{self, Comparison, Subject};
 use crate::report::{self, Pages};
-use crate::staging::Stage;
+use crate::staging::SceneSpec;
 
 /// What every comparison carries unless told otherwise: the baselines, each linear method, and mixtures.
 pub(super) const DEFAULT_METHODS: &str =
@@ -93,7 +93,7 @@ impl Compare {
             warn(&self.map, warning);
         }
         let environment = self.environment.read()?;
-        let brdf: Arc<dyn Brdf> = read_brdf(&self.brdf)?.into();
+        let brdf: Arc<dyn Lobe> = read_brdf(&self.brdf)?.into();
         let run = Run {
             map: &map,
             methods: &methods,
@@ -101,13 +101,13 @@ impl Compare {
             precision: self.precision.into(),
             filtering: self.filtering,
             pictures: self.scene.as_ref().map(|scene| Pictures {
-                stage: Stage {
+                stage: SceneSpec {
                     scene: scene.clone(),
                     map: Some(Arc::clone(&map.surface)),
-                    brdf: Some(Arc::clone(&brdf)),
+                    lobe: Some(Arc::clone(&brdf)),
                     displacement: self.displace.displacement(),
                     environment: environment.clone(),
-                    ..Stage::default()
+                    ..SceneSpec::default()
                 },
                 times: vec![0.0],
                 size: self.picture,
@@ -143,7 +143,7 @@ impl Compare {
 pub(super) struct Run<'a> {
     pub(super) map: &'a SourceMap,
     pub(super) methods: &'a [Box<dyn Method>],
-    pub(super) brdf: &'a dyn Brdf,
+    pub(super) brdf: &'a dyn Lobe,
     pub(super) precision: pyramid::Precision,
     pub(super) filtering: bool,
     pub(super) pictures: Option<Pictures>,
@@ -151,7 +151,7 @@ pub(super) struct Run<'a> {
 
 /// Pictures to be measured.
 pub(super) struct Pictures {
-    pub(super) stage: Stage,
+    pub(super) stage: SceneSpec,
     pub(super) times: Vec<f64>,
     pub(super) size: Size,
     pub(super) lookups: Lookups,
@@ -162,7 +162,7 @@ pub(super) struct Pictures {
 /// What came of it.
 pub(super) struct Measured {
     pub(super) comparison: Comparison,
-    pub(super) reel: Option<Reel>,
+    pub(super) reel: Option<RenderReport>,
     pub(super) written: Vec<PathBuf>,
 }
 
@@ -176,7 +176,7 @@ impl Run<'_> {
         let reel = self.pictures.as_ref().map(|pictures| self.shoot(pictures)).transpose()?;
         let subject = Subject {
             surface: &*self.map.surface,
-            brdf: self.brdf,
+            lobe: self.brdf,
             methods: self.methods,
             precision: self.precision,
             filtering: self.filtering,
@@ -201,8 +201,8 @@ impl Run<'_> {
         Ok(Measured { comparison, reel, written })
     }
 
-    fn shoot(&self, pictures: &Pictures) -> Result<Reel, Failure> {
-        let shot = Shot {
+    fn shoot(&self, pictures: &Pictures) -> Result<RenderReport, Failure> {
+        let shot = RenderJob {
             stage: &pictures.stage,
             times: &pictures.times,
             methods: self.methods,

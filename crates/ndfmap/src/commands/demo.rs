@@ -19,9 +19,9 @@ use super::compare::{DEFAULT_METHODS, Measured, Run};
 use super::{print, print_json, say_if_replaced};
 use crate::Failure;
 use crate::engine::Cpu;
-use crate::imaging::{Shot, shoot};
+use crate::imaging::{RenderJob, shoot};
 use crate::report::pictures;
-use crate::staging::Stage;
+use crate::staging::SceneSpec;
 
 /// Show what distance does to a built-in map, and what each method saves
 #[derive(Debug, Args)]
@@ -47,8 +47,8 @@ const SHOWN: [&str; 3] = ["naive", "toksvig", "vmf:4"];
 /// A contact sheet of a scene, as a PNG file.
 fn sheet(scene: &str, times: &[f64]) -> Result<Vec<u8>, Failure> {
     let methods = SHOWN.iter().map(|m| method(m)).collect::<Result<Vec<_>, _>>()?;
-    let stage = Stage { scene: scene.to_owned(), ..Stage::default() };
-    let shot = Shot {
+    let stage = SceneSpec { scene: scene.to_owned(), ..SceneSpec::default() };
+    let shot = RenderJob {
         stage: &stage,
         times,
         methods: &methods,

@@ -6,11 +6,11 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use glam::DVec3;
+use ndfmap_core::brdf::ShadingModel;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
 use ndfmap_core::lookup::Filtering;
 use ndfmap_core::ndf::Method;
-use ndfmap_core::reflection::Model;
 use ndfmap_core::scene::{self, BakedSurface};
 use ndfmap_core::surface::Surface;
 use ndfmap_core::tone::Tone;
@@ -30,9 +30,9 @@ use crate::Failure;
 use crate::engine::Cpu;
 #[cfg(feature = "gpu")]
 use crate::engine::Gpu;
-use crate::imaging::{Frame, Reel, Shot, shoot};
+use crate::imaging::{Frame, RenderJob, RenderReport, shoot};
 use crate::report::pictures::{self, Plan};
-use crate::staging::{CameraArgument, Displacement, Stage};
+use crate::staging::{CameraArgument, DisplacementOptions, SceneSpec};
 
 /// Render a scene through baked maps, and by brute force to compare
 #[derive(Debug, Args)]
@@ -80,13 +80,13 @@ pub(super) struct Render {
     /// A light in place of the scene's: the direction to it X,Y,Z, or `point:X,Y,Z`, and perhaps :R,G,B. May be repeated
     #[arg(long, value_name = "LIGHT", value_parser = light, allow_hyphen_values = true)]
     light: Vec<Light>,
-    /// A reflectance lobe in place of the materials' own; where a material has gloss of its own, that still widens it
+    /// A reflectance lobe in place of the materials' own; where a material has roughness of its own, that still widens it
     #[arg(long, value_parser = brdf_spelling)]
     brdf: Option<String>,
     /// What goes with the lobe: the factor of Tan et al., of Han et al. or of Smith (tan, han, smith);
     /// or what displaced surfaces have (masked, shadowed)
     #[arg(long, value_parser = model, conflicts_with = "displace")]
-    model: Option<Model>,
+    model: Option<ShadingModel>,
     #[command(flatten)]
     displace: DisplaceArguments,
     #[command(flatten)]
@@ -139,8 +139,8 @@ pub(super) struct DisplaceArguments {
 }
 
 impl DisplaceArguments {
-    pub(super) fn displacement(&self) -> Option<Displacement> {
-        self.displace.map(|scale| Displacement { scale, shadows: self.shadows })
+    pub(super) fn displacement(&self) -> Option<DisplacementOptions> {
+        self.displace.map(|scale| DisplacementOptions { scale, shadows: self.shadows })
     }
 }
 
@@ -355,7 +355,7 @@ impl Render {
             Some(frames) => (0..frames).map(|i| f64::from(i) / f64::from(frames - 1)).collect(),
             None => self.time.clone(),
         };
-        let shot = Shot {
+        let shot = RenderJob {
             stage: &stage,
             times: &times,
             methods: &methods,
@@ -400,9 +400,9 @@ impl Render {
     /// Renders on the device that was asked for.
     fn shoot(
         &self,
-        shot: &Shot<'_>,
+        shot: &RenderJob<'_>,
         each: &mut dyn FnMut(usize, &Frame) -> Result<(), Failure>,
-    ) -> Result<Reel, Failure> {
+    ) -> Result<RenderReport, Failure> {
         #[cfg(feature = "gpu")]
         if let Some(device) = self.device.open()? {
             let gpu = Gpu::new(&device, self.sampler, self.multisample);
@@ -438,7 +438,7 @@ impl Render {
         Ok(Some(BakedSurface { method: map.method(path)?, pyramid: map.pyramid }))
     }
 
-    fn stage(&self, baked: Option<BakedSurface>) -> Result<Stage, Failure> {
+    fn stage(&self, baked: Option<BakedSurface>) -> Result<SceneSpec, Failure> {
         let map = match (baked, &self.map) {
             (Some(baked), _) => Some(Arc::new(baked) as Arc<dyn Surface>),
             (None, Some(path)) => {
@@ -449,12 +449,12 @@ impl Render {
             }
             (None, None) => None,
         };
-        Ok(Stage {
+        Ok(SceneSpec {
             scene: self.scene.clone(),
             map,
             map_size: self.map_size,
-            brdf: self.brdf.as_deref().map(read_brdf).transpose()?.map(Arc::from),
-            model: self.model,
+            lobe: self.brdf.as_deref().map(read_brdf).transpose()?.map(Arc::from),
+            shading: self.model,
             camera: self.camera,
             lights: self.light.clone(),
             diffuse: self.diffuse,
@@ -492,7 +492,7 @@ impl Render {
 
     fn to_json(
         &self,
-        reel: &Reel,
+        reel: &RenderReport,
         environment: Option<serde_json::Value>,
         seconds: f64,
     ) -> serde_json::Value {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use ndfmap_core::reflection::{Model, Reflection};
+use ndfmap_core::brdf::{Brdf, ShadingModel};
 use ndfmap_gpu::export::{Export, Language, TABLE};
 use serde_json::json;
 
@@ -23,7 +23,7 @@ pub(super) struct Shader {
     brdf: String,
     /// What goes with the lobe: the factor of Tan et al., of Han et al. or of Smith (tan, han, smith)
     #[arg(long, default_value = "smith", value_parser = model)]
-    model: Model,
+    model: ShadingModel,
     /// The language
     #[arg(short, long, default_value = "wgsl", value_parser = language)]
     lang: &'static str,
@@ -50,9 +50,9 @@ impl Shader {
     pub(super) fn run(self, json: bool) -> Result<(), Failure> {
         let method = method(&self.method)?;
         let lobe = read_brdf(&self.brdf)?;
-        let reflection = Reflection { lobe, model: self.model };
+        let brdf = Brdf { lobe, shading: self.model };
         let language = find(self.lang).unwrap_or(&TABLE[0]);
-        let bytes = Export { method: &*method, reflection: &reflection }.to(language)?;
+        let bytes = Export { method: &*method, brdf: &brdf }.to(language)?;
         if let Some(file) = &self.output {
             say_if_replaced(file);
             ndfmap_maps::atomic::write(file, &bytes)?;
@@ -66,7 +66,7 @@ impl Shader {
             })?;
             return print_json(&json!({
                 "method": method.spelling(),
-                "brdf": reflection.lobe.spelling(),
+                "brdf": brdf.lobe.spelling(),
                 "model": self.model.name(),
                 "language": language.name,
                 "layers": method.layers(),

@@ -11,7 +11,7 @@ use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
 use ndfmap_trace::truth::{Effort, TruePicture, Truth};
 use serde_json::{Value, json};
 
-use super::{Drawn, Engine, TrueGeometry, View};
+use super::{Engine, RenderedPicture, TrueGeometry, View};
 use crate::Failure;
 
 /// The processor.
@@ -36,10 +36,10 @@ impl Engine for Cpu {
     }
 
     fn set(&self, scene: &Scene, size: Size) -> Result<Geometry, Failure> {
-        if let Some(surroundings) = &scene.surroundings {
+        if let Some(environment) = &scene.environment {
             // Made once, and no frame's time.
             for material in &scene.materials {
-                surroundings.filtered.make(surroundings.technique, material.reflection.lobe.kernel());
+                environment.filtered.make(environment.technique, material.brdf.lobe.microfacets());
             }
         }
         Ok(Geometry::displaced(scene, &scene.camera, size))
@@ -51,7 +51,7 @@ impl Engine for Cpu {
         effort: &Effort,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<TruePicture, Failure> {
-        if !view.scene.has_relief() {
+        if !view.scene.is_displaced() {
             return Ok(Truth::new(view.scene, view.set).render(&view.camera, view.size, effort, progress));
         }
         let true_geometry = TrueGeometry::new(view.scene);
@@ -64,10 +64,10 @@ impl Engine for Cpu {
         maps: &BakedMaps<'_>,
         lookups: Lookups,
         progress: &(dyn Fn(f64) + Sync),
-    ) -> Result<Drawn, Failure> {
+    ) -> Result<RenderedPicture, Failure> {
         let filtered = Filtered { scene: view.scene, geometry: view.set, maps, progress };
         let start = Instant::now();
         let picture = filtered.render(&view.camera, view.size, lookups);
-        Ok(Drawn { picture, milliseconds: start.elapsed().as_secs_f64() * 1e3 })
+        Ok(RenderedPicture { picture, milliseconds: start.elapsed().as_secs_f64() * 1e3 })
     }
 }

@@ -5,14 +5,14 @@ use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{Material, Scene};
 use ndfmap_gpu::{
-    Canvas, Device, Effort, FinestMaps, Geometry, GpuError, Lookups, Maps, Meshes, Outlines, Renderer,
-    Sampling, Shown,
+    Antialiasing, Canvas, Device, Effort, FinestMaps, Geometry, GpuError, Lookups, Maps, Meshes, Renderer,
+    Sampling, SceneView,
 };
 use ndfmap_trace::filtered;
 use ndfmap_trace::truth::{self, TruePicture};
 use serde_json::{Value, json};
 
-use super::{Drawn, Engine, TrueGeometry, View};
+use super::{Engine, RenderedPicture, TrueGeometry, View};
 use crate::Failure;
 
 /// A GPU, and how it draws.
@@ -21,7 +21,7 @@ pub(crate) struct Gpu<'a> {
     renderer: Renderer<'a>,
     /// The device's own sampler filters, with so many taps, in place of ours.
     sampler: Option<u16>,
-    outlines: Outlines,
+    outlines: Antialiasing,
 }
 
 impl From<GpuError> for Failure {
@@ -37,12 +37,12 @@ impl From<GpuError> for Failure {
 impl<'a> Gpu<'a> {
     /// Prepares to draw on a device.
     pub(crate) fn new(device: &'a Device, sampler: Option<u16>, multisample: bool) -> Result<Self, Failure> {
-        let outlines = if multisample { Outlines::Multisampled } else { Outlines::Parts };
+        let outlines = if multisample { Antialiasing::Multisampled } else { Antialiasing::Parts };
         Ok(Self { device, renderer: Renderer::new(device)?, sampler, outlines })
     }
 
-    fn shown<'v>(view: &'v View<'_, Geometry>) -> Shown<'v> {
-        Shown { scene: view.scene, geometry: view.set, camera: &view.camera }
+    fn shown<'v>(view: &'v View<'_, Geometry>) -> SceneView<'v> {
+        SceneView { scene: view.scene, geometry: view.set, camera: &view.camera }
     }
 }
 
@@ -59,7 +59,7 @@ impl Engine for Gpu<'_> {
             "adapter": self.device.description(),
             "clock": if self.device.has_timestamps() { "device" } else { "wall" },
             "sampler": self.sampler,
-            "outlines": if self.outlines == Outlines::Parts { "parts" } else { "multisampled" },
+            "outlines": if self.outlines == Antialiasing::Parts { "parts" } else { "multisampled" },
         })
     }
 
@@ -83,12 +83,12 @@ impl Engine for Gpu<'_> {
         effort: &truth::Effort,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<TruePicture, Failure> {
-        if view.scene.has_relief() || view.scene.surroundings.is_some() {
+        if view.scene.is_displaced() || view.scene.environment.is_some() {
             // Facets of relief are rays' business, and so is light that is drawn by chance.
             let geometry = TrueGeometry::new(view.scene);
             return Ok(geometry.truth(view.scene).render(&view.camera, view.size, effort, progress));
         }
-        let canvas = Canvas::new(self.device, view.size, Outlines::Sharp)?;
+        let canvas = Canvas::new(self.device, view.size, Antialiasing::Sharp)?;
         let finest = FinestMaps::new(self.device, &view.scene.materials)?;
         let effort = Effort { samples: effort.rays, noise: effort.noise, progress };
         let truth = self.renderer.truth(&canvas, &Self::shown(view), &finest, &effort)?;
@@ -101,7 +101,7 @@ impl Engine for Gpu<'_> {
         maps: &Maps<'_>,
         lookups: filtered::Lookups,
         _progress: &(dyn Fn(f64) + Sync),
-    ) -> Result<Drawn, Failure> {
+    ) -> Result<RenderedPicture, Failure> {
         let filtered::Lookups { filtering, neighbours, at_means } = lookups;
         let sampling = self.sampler.map_or(Sampling::Taps(filtering), Sampling::Sampler);
         let lookups = Lookups { sampling, neighbours, at_means };
@@ -111,6 +111,6 @@ impl Engine for Gpu<'_> {
         let picture = canvas.read()?;
         // The picture's own passes made pipelines and read the result back: a frame like the next one tells what it takes.
         let milliseconds = self.renderer.time(&canvas, &shown, maps, lookups)?;
-        Ok(Drawn { picture, milliseconds })
+        Ok(RenderedPicture { picture, milliseconds })
     }
 }

@@ -15,7 +15,7 @@ use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{Camera, Material, Scene};
 use ndfmap_trace::filtered::Lookups;
 use ndfmap_trace::truth::{Effort, TruePicture, Truth};
-use ndfmap_trace::{Geometry, Relief};
+use ndfmap_trace::{DisplacedMeshes, Geometry};
 use serde_json::Value;
 
 use crate::Failure;
@@ -29,7 +29,7 @@ pub(crate) struct View<'a, S> {
 }
 
 /// A picture through baked maps, and what a frame like it takes.
-pub(crate) struct Drawn {
+pub(crate) struct RenderedPicture {
     pub(crate) picture: Picture,
     pub(crate) milliseconds: f64,
 }
@@ -37,23 +37,23 @@ pub(crate) struct Drawn {
 /// What the CPU renderer's truth hits, of a scene with relief or without.
 pub(crate) struct TrueGeometry {
     plain: Geometry,
-    relief: Option<Relief>,
+    displacement: Option<DisplacedMeshes>,
 }
 
 impl TrueGeometry {
     pub(crate) fn new(scene: &Scene) -> Self {
-        if !scene.has_relief() {
-            return Self { plain: Geometry::new(scene), relief: None };
+        if !scene.is_displaced() {
+            return Self { plain: Geometry::new(scene), displacement: None };
         }
-        let relief = Relief::new(scene);
-        let (facets, bytes) = (relief.facets() as f64 / 1e6, relief.bytes() as f64 / 1e6);
+        let displacement = DisplacedMeshes::new(scene);
+        let (facets, bytes) = (displacement.facets() as f64 / 1e6, displacement.bytes() as f64 / 1e6);
         eprintln!("ndfmap: displaced truth: {facets:.1} million facets, {bytes:.0} MB");
-        Self { plain: Geometry::without_relief(scene), relief: Some(relief) }
+        Self { plain: Geometry::without_displacement(scene), displacement: Some(displacement) }
     }
 
     pub(crate) fn truth<'a>(&'a self, scene: &'a Scene) -> Truth<'a> {
-        match &self.relief {
-            Some(relief) => Truth::displaced(scene, &self.plain, relief),
+        match &self.displacement {
+            Some(displacement) => Truth::displaced(scene, &self.plain, displacement),
             None => Truth::new(scene, &self.plain),
         }
     }
@@ -99,5 +99,5 @@ pub(crate) trait Engine {
         maps: &Self::Maps<'_>,
         lookups: Lookups,
         progress: &(dyn Fn(f64) + Sync),
-    ) -> Result<Drawn, Failure>;
+    ) -> Result<RenderedPicture, Failure>;
 }

@@ -4,10 +4,9 @@
 use glam::DVec2;
 use ndfmap_core::bake::Bake;
 use ndfmap_core::brdf;
-use ndfmap_core::error::Truth;
-use ndfmap_core::filtering::evaluate_neighbours;
 use ndfmap_core::fit::{Alignment, LobeKind};
 use ndfmap_core::lookup::{Tap, Texels};
+use ndfmap_core::measure::{TexelTruth, evaluate_neighbours};
 use ndfmap_core::ndf::{self, Method};
 use ndfmap_core::pyramid::Pyramid;
 use ndfmap_core::sphere::DiskLattice;
@@ -32,7 +31,7 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Option<Can
     let size = comparison.sizes[level];
     let pen = brdf::parse(PEN).unwrap_or_else(|e| unreachable!("the pen is a constant: {e}"));
     let lattice = DiskLattice::new(SIDE, 0.99);
-    let truth = Truth::new(subject.surface, &*pen, &lattice);
+    let truth = TexelTruth::new(subject.surface, &*pen, &lattice);
     let (x, y) = busiest(subject, size);
     let place = DVec2::new((x + 1) as f64 / size.width as f64, (y + 1) as f64 / size.height as f64);
     let disk = SIDE * SCALE;

@@ -1,11 +1,10 @@
 //! What the normals under one texel do, drawn on the unit disk: the truth beside every method.
 
 use glam::Vec3;
-use ndfmap_core::brdf;
-use ndfmap_core::error::Truth;
 use ndfmap_core::grid::Size;
-use ndfmap_core::ndf;
+use ndfmap_core::measure::TexelTruth;
 use ndfmap_core::sphere::DiskLattice;
+use ndfmap_core::{brdf, ndf};
 
 use super::canvas::{Canvas, LETTER, LINE, heat};
 use crate::measure::{Comparison, Subject};
@@ -24,7 +23,7 @@ const LEVELS: [usize; 3] = [3, 5, 7];
 pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Canvas {
     let pen = brdf::parse(PEN).unwrap_or_else(|e| unreachable!("the pen is a constant: {e}"));
     let lattice = DiskLattice::new(SIDE, 0.99);
-    let truth = Truth::new(subject.surface, &*pen, &lattice);
+    let truth = TexelTruth::new(subject.surface, &*pen, &lattice);
     let last = comparison.sizes.len() - 1;
     let mut levels: Vec<usize> = LEVELS.iter().map(|l| *l.min(&last)).collect();
     levels.dedup();

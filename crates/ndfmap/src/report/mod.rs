@@ -10,11 +10,11 @@ mod sheet;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use minijinja::{Environment, context};
-use ndfmap_core::filtering::FilteringError;
+use ndfmap_core::measure::FilteringError;
 use ndfmap_maps::Source;
 
 use crate::Failure;
-use crate::imaging::Reel;
+use crate::imaging::RenderReport;
 use crate::measure::{Comparison, Subject, three_digits};
 
 /// What a report is drawn from.
@@ -22,7 +22,7 @@ pub(crate) struct Pages<'a> {
     pub(crate) subject: &'a Subject<'a>,
     pub(crate) comparison: &'a Comparison,
     /// Pictures of a scene, where asked for.
-    pub(crate) reel: Option<&'a Reel>,
+    pub(crate) reel: Option<&'a RenderReport>,
     pub(crate) source: &'a Source,
     pub(crate) warnings: &'a [String],
 }
@@ -102,7 +102,7 @@ fn page(pages: &Pages<'_>, figures: &Figures<'_>) -> Result<String, Failure> {
     template
         .render(context! {
             map => pages.source.file.clone(),
-            brdf => comparison.brdf.clone(),
+            lobe => comparison.lobe.clone(),
             size => sizes.first(),
             sizes => sizes,
             rows => rows,

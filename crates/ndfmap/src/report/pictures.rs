@@ -6,7 +6,7 @@ use ndfmap_maps::picture::to_bytes;
 
 use super::canvas::{Canvas, LETTER, LINE, Rgb, heat};
 use crate::Failure;
-use crate::imaging::{Errors, Reel};
+use crate::imaging::{PictureErrors, RenderReport};
 
 /// Difference of display values, over sqrt 3, that is drawn brightest.
 const BRIGHTEST: f32 = 0.5;
@@ -45,7 +45,7 @@ impl Plan {
 }
 
 /// Draws the sheet as a PNG file: two rows a frame where there is a truth, else one.
-pub(crate) fn draw(reel: &Reel, title: &str) -> Result<Vec<u8>, Failure> {
+pub(crate) fn draw(reel: &RenderReport, title: &str) -> Result<Vec<u8>, Failure> {
     let Some(first) = reel.frames.first() else { return Canvas::new(1, 1).to_png() };
     let has_truth = first.truth.is_some();
     let size = first.pictures[0].size();
@@ -86,7 +86,7 @@ pub(crate) fn draw(reel: &Reel, title: &str) -> Result<Vec<u8>, Failure> {
     canvas.to_png()
 }
 
-fn lines_of(e: Errors) -> [String; 2] {
+fn lines_of(e: PictureErrors) -> [String; 2] {
     let flip = e.flip.map_or_else(String::new, |f| format!("flip {f:.3} "));
     let sparkle = e.sparkle.map_or_else(String::new, |s| format!("sparkle {s:.2}"));
     [format!("color {:.4} l2 {:.3}", e.color_error, e.relative_l2), flip + &sparkle]

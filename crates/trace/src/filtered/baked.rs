@@ -2,9 +2,9 @@
 
 use glam::{DMat2, DVec3};
 use ndfmap_core::lookup::{Lookup, PixelFootprint, Texels};
-use ndfmap_core::ndf::{FilteredTexel, Lit, Method, Prepared, Surround};
+use ndfmap_core::ndf::{FilteredTexel, IncidentLight, LocalEnvironment, Method, PreparedBrdf};
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{BakedMaterial, FinishMap, Material};
+use ndfmap_core::scene::{BakedMaterial, Material, SurfaceTextures};
 
 use super::Lookups;
 
@@ -13,19 +13,19 @@ pub(super) struct Baked {
     map: Lookup,
     /// Layers of the method itself; those of attributes follow.
     layers: usize,
-    /// Colours and gloss, for methods whose lobes carry none.
-    finish: Vec<Lookup>,
+    /// Colours and roughness, for methods whose lobes carry none.
+    params: Vec<Lookup>,
 }
 
 /// A material as it is shaded with one method.
 pub(super) struct Shading<'a> {
     pub(super) material: &'a Material,
     pub(super) method: &'a dyn Method,
-    pub(super) prepared: &'a Prepared,
+    pub(super) prepared: &'a PreparedBrdf,
     /// On a displaced surface, how slopes of the map lie on it.
-    pub(super) relief: Option<DMat2>,
+    pub(super) slope_map: Option<DMat2>,
     /// In an environment, what is around the place.
-    pub(super) surround: Option<Surround<'a>>,
+    pub(super) local: Option<LocalEnvironment<'a>>,
 }
 
 impl Baked {
@@ -41,7 +41,7 @@ impl Baked {
         Self {
             map: Lookup::new(&baked.pyramid),
             layers: method.layers(),
-            finish: baked.finish.iter().map(|values| Lookup::of_values(values, wraps)).collect(),
+            params: baked.params.iter().map(|values| Lookup::of_values(values, wraps)).collect(),
         }
     }
 
@@ -51,11 +51,11 @@ impl Baked {
         shading: &Shading<'_>,
         pixel: &PixelFootprint,
         lookups: Lookups,
-        (channels, lights): (&mut Vec<f32>, &[Lit]),
+        (channels, lights): (&mut Vec<f32>, &[IncidentLight]),
     ) -> DVec3 {
         let filtering = lookups.filtering;
         let mut colours = [[0.0; 4]; 2];
-        for (lookup, colour) in self.finish.iter().zip(&mut colours) {
+        for (lookup, colour) in self.params.iter().zip(&mut colours) {
             lookup.filtered(pixel, filtering, colour);
         }
         if lookups.neighbours || !shading.method.filterable() {
@@ -77,36 +77,39 @@ impl Baked {
         shading: &Shading<'_>,
         (channels, colours): (&[f32], &[[f32; 4]; 2]),
         lookups: Lookups,
-        lights: &[Lit],
+        lights: &[IncidentLight],
     ) -> DVec3 {
         let material = shading.material;
-        let finish = |layer: Option<usize>| match (&material.finish_map, layer) {
-            (None, _) => material.finish,
-            (Some(_), Some(layer)) if self.finish.is_empty() => {
+        let params = |layer: Option<usize>| match (&material.textures, layer) {
+            (None, _) => material.params,
+            (Some(_), Some(layer)) if self.params.is_empty() => {
                 // A lobe's attributes are stored times its weight.
                 let weight = channels[4 * layer].max(f32::MIN_POSITIVE);
                 let attribute = |k: usize| {
                     let from = 4 * ((k + 1) * self.layers + layer);
                     channels.get(from..from + 4).map(|c| [0, 1, 2, 3].map(|i| c[i] / weight))
                 };
-                FinishMap::finish(attribute(0).unwrap_or_default(), attribute(1), material.finish.specular)
+                SurfaceTextures::from_channels(
+                    attribute(0).unwrap_or_default(),
+                    attribute(1),
+                    material.params.specular,
+                )
             }
-            (Some(_), _) => FinishMap::finish(
+            (Some(_), _) => SurfaceTextures::from_channels(
                 colours[0],
-                (self.finish.len() > 1).then_some(colours[1]),
-                material.finish.specular,
+                (self.params.len() > 1).then_some(colours[1]),
+                material.params.specular,
             ),
         };
         let texel = FilteredTexel {
             channels: &channels[..4 * self.layers],
-            finish: &finish,
+            params: &params,
             prepared: shading.prepared,
             at_means: lookups.at_means,
-            relief: shading.relief,
+            slope_map: shading.slope_map,
         };
-        let (method, reflection) = (shading.method, &material.reflection);
-        let of_environment = |surround| method.reflect_environment(&texel, reflection, surround);
-        method.reflect(&texel, reflection, lights)
-            + shading.surround.as_ref().map_or(DVec3::ZERO, of_environment)
+        let (method, brdf) = (shading.method, &material.brdf);
+        let of_environment = |local| method.reflect_environment(&texel, brdf, local);
+        method.reflect(&texel, brdf, lights) + shading.local.as_ref().map_or(DVec3::ZERO, of_environment)
     }
 }

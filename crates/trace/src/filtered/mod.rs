@@ -8,20 +8,20 @@ mod baked;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
+use ndfmap_core::brdf::Directions;
 use ndfmap_core::grid::{Grid, Size};
-use ndfmap_core::light::environment::Surroundings;
+use ndfmap_core::light::environment::SceneEnvironment;
 use ndfmap_core::light::{Light, SplitSum};
 use ndfmap_core::lookup::{Filtering, PixelFootprint};
 use ndfmap_core::metrics::Picture;
-use ndfmap_core::ndf::{Lit, Method, Prepared, Surround};
+use ndfmap_core::ndf::{IncidentLight, LocalEnvironment, Method, PreparedBrdf};
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::reflection::Way;
 use ndfmap_core::scene::{Camera, Material, Rays, Scene};
 use rayon::prelude::*;
 
 use self::baked::{Baked, Shading};
 use crate::geometry::{Geometry, Hit, Place};
-use crate::ways;
+use crate::incident_directions;
 
 /// How maps are looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,32 +91,32 @@ const BAND: usize = 16;
 struct How<'a> {
     lookups: Lookups,
     /// For each material.
-    prepared: &'a [Prepared],
-    around: Option<&'a Around<'a>>,
+    prepared: &'a [PreparedBrdf],
+    around: Option<&'a EnvironmentShading<'a>>,
 }
 
 /// An environment that a scene stands in, and what its materials make of it.
-struct Around<'a> {
-    surroundings: &'a Surroundings,
+struct EnvironmentShading<'a> {
+    environment: &'a SceneEnvironment,
     to_environment: DMat3,
     suns: Vec<Light>,
     /// For each material.
     split_sums: Vec<SplitSum>,
 }
 
-impl<'a> Around<'a> {
-    fn new(surroundings: &'a Surroundings, materials: &[Material]) -> Self {
-        let split_sums: Vec<SplitSum> = materials.iter().map(|m| SplitSum::new(&m.reflection)).collect();
-        split_sums.iter().for_each(|s| surroundings.filtered.make(surroundings.technique, s.kernel));
-        let (to_environment, suns) = (surroundings.to_environment(), surroundings.suns());
-        Self { surroundings, to_environment, suns, split_sums }
+impl<'a> EnvironmentShading<'a> {
+    fn new(environment: &'a SceneEnvironment, materials: &[Material]) -> Self {
+        let split_sums: Vec<SplitSum> = materials.iter().map(|m| SplitSum::new(&m.brdf)).collect();
+        split_sums.iter().for_each(|s| environment.filtered.make(environment.technique, s.microfacets));
+        let (to_environment, suns) = (environment.to_environment(), environment.suns());
+        Self { environment, to_environment, suns, split_sums }
     }
 
     /// What surrounds a place.
-    fn at(&self, place: &Place, wo: DVec3) -> Surround<'_> {
-        Surround {
-            light: &self.surroundings.filtered,
-            technique: self.surroundings.technique,
+    fn at(&self, place: &Place, wo: DVec3) -> LocalEnvironment<'_> {
+        LocalEnvironment {
+            light: &self.environment.filtered,
+            technique: self.environment.technique,
             to_environment: self.to_environment * place.frame,
             wo,
             split_sum: &self.split_sums[place.material],
@@ -127,7 +127,7 @@ impl<'a> Around<'a> {
 /// Room for a pixel's channels.
 struct Scratch {
     channels: Vec<f32>,
-    lights: Vec<Lit>,
+    lights: Vec<IncidentLight>,
 }
 
 impl Filtered<'_> {
@@ -135,9 +135,10 @@ impl Filtered<'_> {
     #[must_use]
     pub fn render(&self, camera: &Camera, size: Size, lookups: Lookups) -> Picture {
         let rays = camera.rays(size);
-        let prepare = |m: &Material| self.maps.method.prepare(&m.reflection, m.finish.gloss);
-        let prepared: Vec<Prepared> = self.scene.materials.iter().map(prepare).collect();
-        let around = self.scene.surroundings.as_ref().map(|s| Around::new(s, &self.scene.materials));
+        let prepare = |m: &Material| self.maps.method.prepare(&m.brdf, m.params.roughness);
+        let prepared: Vec<PreparedBrdf> = self.scene.materials.iter().map(prepare).collect();
+        let around =
+            self.scene.environment.as_ref().map(|s| EnvironmentShading::new(s, &self.scene.materials));
         let how = How { lookups, prepared: &prepared, around: around.as_ref() };
         let done = AtomicUsize::new(0);
         let band = |first: usize| {
@@ -205,18 +206,19 @@ impl Filtered<'_> {
         let Some((hit, place)) = hit else { return self.scene.background.as_dvec3() };
         let wo = place.frame.transpose() * -rays.direction(at);
         scratch.lights.clear();
-        let relief = place.stretch.filter(|_| self.maps.displaces);
-        let between = if relief.is_some() { Way::between } else { Way::new };
-        let of_scene = ways(&self.scene.lights, (place.position, place.frame), wo, between);
-        let lit = |(way, irradiance)| Lit { way, irradiance };
+        let slope_map = place.stretch.filter(|_| self.maps.displaces);
+        let between = if slope_map.is_some() { Directions::between } else { Directions::new };
+        let of_scene = incident_directions(&self.scene.lights, (place.position, place.frame), wo, between);
+        let lit = |(directions, irradiance)| IncidentLight { directions, irradiance };
         scratch.lights.extend(of_scene.map(lit));
-        let surround = how.around.map(|around| {
+        let local = how.around.map(|around| {
             // Of an environment normals see what the base surface does not.
-            let suns = ways(&around.suns, (place.position, place.frame), wo, Way::between);
+            let suns =
+                incident_directions(&around.suns, (place.position, place.frame), wo, Directions::between);
             scratch.lights.extend(suns.map(lit));
             around.at(place, wo)
         });
-        if scratch.lights.is_empty() && surround.is_none() {
+        if scratch.lights.is_empty() && local.is_none() {
             return DVec3::ZERO;
         }
         let [dx, dy] = self.geometry.differentials(hit, place, rays, at);
@@ -225,8 +227,8 @@ impl Filtered<'_> {
             material: &self.scene.materials[place.material],
             method: self.maps.method,
             prepared: &how.prepared[place.material],
-            relief,
-            surround,
+            slope_map,
+            local,
         };
         let Scratch { channels, lights } = scratch;
         self.maps.materials[place.material].shade(&shading, &pixel, how.lookups, (channels, lights))

@@ -6,13 +6,13 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::{DMat3, DVec2, DVec3};
-use ndfmap_core::light::environment::{Environment, EnvironmentSampler, Kernel, Surroundings};
-use ndfmap_core::reflection::{Finish, Reflection, Way};
+use ndfmap_core::brdf::{Brdf, Directions, Microfacets, SurfaceParams};
+use ndfmap_core::light::environment::{Environment, EnvironmentSampler, SceneEnvironment};
 use ndfmap_core::sphere::frame;
 
 /// Where directions are drawn from.
-pub(super) struct Sky<'a> {
-    environment: &'a Environment,
+pub(super) struct SampledEnvironment<'a> {
+    map: &'a Environment,
     sampler: EnvironmentSampler,
     to_environment: DMat3,
 }
@@ -28,34 +28,35 @@ pub(super) fn numbers(begin: [[f64; 2]; 3], ray: usize) -> Numbers {
 }
 
 /// A facet that is lit: frame of the tangent space, in which all else is.
-pub(super) struct Shown<'a> {
+pub(super) struct LitFacet<'a> {
     pub(super) frame: DMat3,
     pub(super) wo: DVec3,
     pub(super) n: DVec3,
-    pub(super) finish: &'a Finish,
-    pub(super) reflection: &'a Reflection,
+    pub(super) params: &'a SurfaceParams,
+    pub(super) brdf: &'a Brdf,
 }
 
-impl Shown<'_> {
+impl LitFacet<'_> {
     /// Width of facets that are drawn: GGX as wide as the lobe has weight wherever it has.
     fn alpha_squared(&self) -> f64 {
-        (2.0 * self.reflection.width(self.finish.gloss).get()).max(1e-9)
+        (2.0 * self.brdf.width(self.params.roughness).get()).max(1e-9)
     }
 
     /// A direction that the lobe may mirror.
     fn draw_mirror(&self, random: DVec2) -> DVec3 {
-        let z = (1.0 + Kernel::Ggx.quantile(self.alpha_squared(), random.x)).sqrt().recip();
+        let z = (1.0 + Microfacets::Ggx.quantile(self.alpha_squared(), random.x)).sqrt().recip();
         let wh = around(self.n, z, random.y);
         wh * (2.0 * wh.dot(self.wo)) - self.wo
     }
 
     /// Density of those, per solid angle.
-    fn mirror_density(&self, way: &Way) -> f64 {
-        let z = way.wh.dot(self.n);
-        if z <= 0.0 || way.u <= 0.0 {
+    fn mirror_density(&self, directions: &Directions) -> f64 {
+        let z = directions.wh.dot(self.n);
+        if z <= 0.0 || directions.u <= 0.0 {
             return 0.0;
         }
-        Kernel::Ggx.facets(self.alpha_squared(), (1.0 - z * z).max(0.0) / (z * z)) * z / (4.0 * way.u)
+        Microfacets::Ggx.d_of_tangent(self.alpha_squared(), (1.0 - z * z).max(0.0) / (z * z)) * z
+            / (4.0 * directions.u)
     }
 }
 
@@ -65,22 +66,26 @@ fn around(n: DVec3, z: f64, turn: f64) -> DVec3 {
     (x * cos + y * sin) * (1.0 - z * z).max(0.0).sqrt() + n * z
 }
 
-impl<'a> Sky<'a> {
-    pub(super) fn new(surroundings: &'a Surroundings) -> Self {
-        let environment = &*surroundings.environment;
+impl<'a> SampledEnvironment<'a> {
+    pub(super) fn new(environment: &'a SceneEnvironment) -> Self {
         Self {
-            environment,
-            sampler: EnvironmentSampler::new(environment),
-            to_environment: surroundings.to_environment(),
+            map: &environment.map,
+            sampler: EnvironmentSampler::new(&environment.map),
+            to_environment: environment.to_environment(),
         }
     }
 
     /// An estimate of the light that a facet sends to the eye, of what comes from directions that are `open`.
-    pub(super) fn light(&self, shown: &Shown<'_>, open: impl Fn(DVec3) -> bool, numbers: Numbers) -> DVec3 {
+    pub(super) fn light(
+        &self,
+        shown: &LitFacet<'_>,
+        open: impl Fn(DVec3) -> bool,
+        numbers: Numbers,
+    ) -> DVec3 {
         let to_environment = self.to_environment * shown.frame;
-        let specular = shown.reflection.is_specular();
+        let specular = shown.brdf.is_specular();
         let [of_sky, of_cosine, of_lobe] = numbers;
-        let from_sky = to_environment.transpose() * self.sampler.draw(self.environment, of_sky).0;
+        let from_sky = to_environment.transpose() * self.sampler.draw(self.map, of_sky).0;
         let drawn = [
             Some(from_sky),
             Some(around(shown.n, of_cosine.x.sqrt(), of_cosine.y)),
@@ -88,18 +93,18 @@ impl<'a> Sky<'a> {
         ];
         let mut sum = DVec3::ZERO;
         for wi in drawn.into_iter().flatten() {
-            let Some(way) = Way::between(wi, shown.wo) else { continue };
+            let Some(directions) = Directions::between(wi, shown.wo) else { continue };
             let towards = to_environment * wi;
-            let mut density = self.sampler.density(self.environment, towards) + shown.n.dot(wi).max(0.0) / PI;
+            let mut density = self.sampler.density(self.map, towards) + shown.n.dot(wi).max(0.0) / PI;
             if specular {
-                density += shown.mirror_density(&way);
+                density += shown.mirror_density(&directions);
             }
             if density <= 0.0 {
                 continue;
             }
-            let reflected = shown.reflection.facet(shown.n, shown.finish, &way);
+            let reflected = shown.brdf.facet(shown.n, shown.params, &directions);
             if reflected != DVec3::ZERO && open(wi) {
-                sum += self.environment.radiance(towards) * reflected / density;
+                sum += self.map.radiance(towards) * reflected / density;
             }
         }
         sum

@@ -10,21 +10,20 @@ mod environment;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
+use ndfmap_core::brdf::{Directions, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
 use ndfmap_core::metrics::{Picture, relative_l2};
-use ndfmap_core::reflection::{Finish, Model, Way};
 use ndfmap_core::scene::{Camera, Material, Rays, Scene};
 use ndfmap_core::surface::{SurfaceRow, Wraps, normal_of_slope, slope_of_normal};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
-use self::environment::{Numbers, Shown, Sky};
-use crate::drift;
+use self::environment::{LitFacet, Numbers, SampledEnvironment};
+use crate::displacement::{DisplacedMeshes, Facet};
 use crate::geometry::{Geometry, Place};
-use crate::relief::{Facet, Relief};
-use crate::ways;
+use crate::{drift, incident_directions};
 
 /// Strata a pixel is cut into on each axis; every pass sends a ray through each.
 const STRATA: usize = 4;
@@ -73,9 +72,9 @@ impl Finest<'_> {
     }
 
     /// What a texel is made of.
-    fn finish(&self, x: usize, y: usize) -> Finish {
-        let own = self.material.finish;
-        self.material.finish_map.as_ref().map_or(own, |map| map.at(x, y, own.specular))
+    fn finish(&self, x: usize, y: usize) -> SurfaceParams {
+        let own = self.material.params;
+        self.material.textures.as_ref().map_or(own, |map| map.at(x, y, own.specular))
     }
 }
 
@@ -84,9 +83,9 @@ pub struct Truth<'a> {
     scene: &'a Scene,
     geometry: &'a Geometry,
     /// What of the scene is displaced; the rest is in `geometry`.
-    relief: Option<&'a Relief>,
+    displacement: Option<&'a DisplacedMeshes>,
     materials: Vec<Finest<'a>>,
-    sky: Option<Sky<'a>>,
+    environment: Option<SampledEnvironment<'a>>,
 }
 
 impl<'a> Truth<'a> {
@@ -105,13 +104,19 @@ impl<'a> Truth<'a> {
             Finest { material, normals, wraps: surface.wraps() }
         };
         let materials = scene.materials.iter().map(finest).collect();
-        Self { scene, geometry, relief: None, materials, sky: scene.surroundings.as_ref().map(Sky::new) }
+        Self {
+            scene,
+            geometry,
+            displacement: None,
+            materials,
+            environment: scene.environment.as_ref().map(SampledEnvironment::new),
+        }
     }
 
     /// The same of a displaced scene: the meshes that have relief by its facets, and by `geometry` those that have none.
     #[must_use]
-    pub fn displaced(scene: &'a Scene, geometry: &'a Geometry, relief: &'a Relief) -> Self {
-        Self { relief: Some(relief), ..Self::new(scene, geometry) }
+    pub fn displaced(scene: &'a Scene, geometry: &'a Geometry, displacement: &'a DisplacedMeshes) -> Self {
+        Self { displacement: Some(displacement), ..Self::new(scene, geometry) }
     }
 
     /// Renders until the effort is spent. `progress` is told the fraction done.
@@ -184,7 +189,7 @@ impl<'a> Truth<'a> {
                 let mut random = Pcg64Mcg::seed_from_u64(mix([half, y as u64, x as u64]));
                 let corner = DVec2::new(x as f64, y as f64);
                 let mut ray = || {
-                    let numbers = self.sky.as_ref().map(|_| random.random()).unwrap_or_default();
+                    let numbers = self.environment.as_ref().map(|_| random.random()).unwrap_or_default();
                     self.ray(&cell_rays, (corner, 1.0), environment::numbers(numbers, 0), &mut random)
                 };
                 (0..each).map(|_| ray()).sum::<DVec3>() / each as f64
@@ -209,7 +214,7 @@ impl<'a> Truth<'a> {
         // A pixel's own beginning, the same for all passes of one half.
         let [seed, pass, at] = stream;
         let begin = || Pcg64Mcg::seed_from_u64(mix([!seed, pass % 2, at])).random();
-        let begin = self.sky.as_ref().map(|_| begin()).unwrap_or_default();
+        let begin = self.environment.as_ref().map(|_| begin()).unwrap_or_default();
         let first = (pass / 2) as usize * STRATA * STRATA;
         let mut sum = DVec3::ZERO;
         for i in 0..STRATA * STRATA {
@@ -232,10 +237,10 @@ impl<'a> Truth<'a> {
         let direction = rays.direction(corner + DVec2::new(u, v) * width);
         let plain = self.geometry.hit(rays.eye, direction);
         let limit = plain.map_or(f64::INFINITY, |hit| hit.distance);
-        if let Some(relief) = self.relief
-            && let Some(hit) = relief.hit(rays.eye, direction, limit)
+        if let Some(displacement) = self.displacement
+            && let Some(hit) = displacement.hit(rays.eye, direction, limit)
         {
-            let facet = relief.facet(&hit, direction);
+            let facet = displacement.facet(&hit, direction);
             return self.shade_facet(&facet, -direction, (DVec2::new(s, t) - 0.5, numbers));
         }
         match plain {
@@ -252,39 +257,47 @@ impl<'a> Truth<'a> {
     fn shade_facet(&self, facet: &Facet, eye: DVec3, (displaced, numbers): (DVec2, Numbers)) -> DVec3 {
         let finest = &self.materials[facet.material];
         let (x, y) = finest.texel(facet.uv, displaced);
-        let (reflection, finish) = (&finest.material.reflection, finest.finish(x, y));
+        let (brdf, params) = (&finest.material.brdf, finest.finish(x, y));
         let (tangent, bitangent) = facet.normal.any_orthonormal_pair();
         let frame = DMat3::from_cols(tangent, bitangent, facet.normal);
         let wo = frame.transpose() * eye;
         let of = |light: &Light| {
             let (towards, irradiance) = light.seen_from(facet.position);
-            let Some(way) = Way::between(frame.transpose() * towards, wo) else { return DVec3::ZERO };
-            if reflection.model == Model::Shadowed && (way.wi.z <= 0.0 || self.in_shadow(facet, light)) {
+            let Some(directions) = Directions::between(frame.transpose() * towards, wo) else {
+                return DVec3::ZERO;
+            };
+            if brdf.shading == ShadingModel::Shadowed
+                && (directions.wi.z <= 0.0 || self.in_shadow(facet, light))
+            {
                 return DVec3::ZERO;
             }
-            irradiance * reflection.facet(DVec3::Z, &finish, &way)
+            irradiance * brdf.facet(DVec3::Z, &params, &directions)
         };
         let direct: DVec3 = self.scene.lights.iter().map(of).sum();
-        let shown = Shown { frame, wo, n: DVec3::Z, finish: &finish, reflection };
-        let shadows = reflection.model == Model::Shadowed;
+        let shown = LitFacet { frame, wo, n: DVec3::Z, params: &params, brdf };
+        let shadows = brdf.shading == ShadingModel::Shadowed;
         let open = |wi: DVec3| {
             // A light like any other, of which only the direction counts.
             let light = || Light::Directional { towards: frame * wi, irradiance: DVec3::ONE };
             !shadows || (wi.z > 0.0 && !self.in_shadow(facet, &light()))
         };
-        direct + self.sky.as_ref().map_or(DVec3::ZERO, |sky| sky.light(&shown, open, numbers))
+        direct
+            + self
+                .environment
+                .as_ref()
+                .map_or(DVec3::ZERO, |environment| environment.light(&shown, open, numbers))
     }
 
     /// True where something stands between a facet and a light.
     fn in_shadow(&self, facet: &Facet, light: &Light) -> bool {
-        let Some(relief) = self.relief else { return false };
-        let from = facet.position + facet.normal * (LIFT * relief.radius());
+        let Some(displacement) = self.displacement else { return false };
+        let from = facet.position + facet.normal * (LIFT * displacement.radius());
         let (towards, _) = light.seen_from(from);
         let reach = match light {
             Light::Directional { .. } => f64::INFINITY,
             Light::Point { at, .. } => at.distance(from),
         };
-        relief.hit(from, towards, reach).is_some()
+        displacement.hit(from, towards, reach).is_some()
             || self.geometry.hit(from, towards).is_some_and(|hit| hit.distance < reach)
     }
 
@@ -292,7 +305,7 @@ impl<'a> Truth<'a> {
     fn shade(&self, place: &Place, eye: DVec3, (displaced, numbers): (DVec2, Numbers)) -> DVec3 {
         let finest = &self.materials[place.material];
         let (x, y) = finest.texel(place.uv, displaced);
-        let (material, finish) = (finest.material, finest.finish(x, y));
+        let (material, params) = (finest.material, finest.finish(x, y));
         let n = finest.normals.row(y)[x];
         // Heights that displace nothing: their slopes as they lie on the mesh.
         let n = match place.stretch {
@@ -300,12 +313,17 @@ impl<'a> Truth<'a> {
             None => n.as_dvec3(),
         };
         let wo = place.frame.transpose() * eye;
-        let reflection = &material.reflection;
-        let direct: DVec3 = ways(&self.scene.lights, (place.position, place.frame), wo, Way::new)
-            .map(|(way, irradiance)| irradiance * reflection.facet(n, &finish, &way))
-            .sum();
-        let shown = Shown { frame: place.frame, wo, n, finish: &finish, reflection };
-        direct + self.sky.as_ref().map_or(DVec3::ZERO, |sky| sky.light(&shown, |_| true, numbers))
+        let brdf = &material.brdf;
+        let direct: DVec3 =
+            incident_directions(&self.scene.lights, (place.position, place.frame), wo, Directions::new)
+                .map(|(directions, irradiance)| irradiance * brdf.facet(n, &params, &directions))
+                .sum();
+        let shown = LitFacet { frame: place.frame, wo, n, params: &params, brdf };
+        direct
+            + self
+                .environment
+                .as_ref()
+                .map_or(DVec3::ZERO, |environment| environment.light(&shown, |_| true, numbers))
     }
 }
 

@@ -5,11 +5,11 @@
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
+use ndfmap_core::brdf::{Brdf, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::Size;
 use ndfmap_core::light::Light;
 use ndfmap_core::metrics::Picture;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::reflection::{Finish, Model, Reflection};
 use ndfmap_core::scene::{Camera, Material, Mesh, Object, Scene};
 use ndfmap_core::surface::Surface;
 use ndfmap_core::units::SlopeVariance;
@@ -25,7 +25,7 @@ pub(crate) fn map(name: &str, side: usize) -> Arc<dyn Surface> {
 }
 
 /// A plane of side 2 at z = 0 that faces +z, seen from `distance` through an angle that just holds it.
-pub(crate) fn plate(surface: Arc<dyn Surface>, lobe: &str, model: Model, distance: f64) -> Scene {
+pub(crate) fn plate(surface: Arc<dyn Surface>, lobe: &str, shading: ShadingModel, distance: f64) -> Scene {
     let mesh =
         Mesh::from_patch((1, 1), glam::DVec2::ONE, |s, t| DVec3::new(2.0 * s - 1.0, 2.0 * t - 1.0, 0.0));
     let degrees = 2.0 * (1.0 / distance).atan().to_degrees();
@@ -35,20 +35,20 @@ pub(crate) fn plate(surface: Arc<dyn Surface>, lobe: &str, model: Model, distanc
         materials: vec![Material {
             name: "plate".to_owned(),
             surface,
-            finish: Finish {
+            params: SurfaceParams {
                 diffuse: DVec3::new(0.4, 0.3, 0.2),
                 specular: DVec3::splat(0.1),
-                gloss: SlopeVariance::ZERO,
+                roughness: SlopeVariance::ZERO,
             },
-            finish_map: None,
-            relief: None,
-            reflection: Reflection { lobe: brdf::parse(lobe).unwrap(), model },
+            textures: None,
+            displacement: None,
+            brdf: Brdf { lobe: brdf::parse(lobe).unwrap(), shading },
         }],
         lights: vec![Light::Directional {
             towards: DVec3::new(0.3, 0.2, 0.9).normalize(),
             irradiance: DVec3::ONE,
         }],
-        surroundings: None,
+        environment: None,
         background: Vec3::ZERO,
         exposure: 1.0,
     }

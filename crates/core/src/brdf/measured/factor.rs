@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use nalgebra::{SMatrix, SVector};
 
-use super::{Factors, kernel};
+use super::{LobeFactors, kernel};
 
 /// Bins of `theta_h` and of `theta_d` in a MERL table, to 90 degrees.
 pub const BINS: usize = 90;
@@ -65,7 +65,10 @@ struct Cell {
     weight: f64,
 }
 
-pub(super) fn factor(turns: usize, reflectance: impl Fn(DVec3, DVec3, usize) -> Option<DVec3>) -> Factors {
+pub(super) fn factor(
+    turns: usize,
+    reflectance: impl Fn(DVec3, DVec3, usize) -> Option<DVec3>,
+) -> LobeFactors {
     let samples = |h: usize, d: usize| {
         let (theta_h, theta_d) = (half_angle(h as f64 + 0.5), difference_angle(d as f64 + 0.5));
         let reflectance = &reflectance;
@@ -113,7 +116,7 @@ pub(super) fn factor(turns: usize, reflectance: impl Fn(DVec3, DVec3, usize) -> 
     }
     let relative = |left: f64| if all > 0.0 { (left / all).sqrt() } else { 0.0 };
     let residual = Residual { factored: relative(factored), fitted: relative(fitted) };
-    Factors { diffuse: tables.diffuse * PI, kernels, tint, residual }
+    LobeFactors { diffuse: tables.diffuse * PI, kernels, tint, residual }
 }
 
 /// The factors as tables.

@@ -19,8 +19,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::{Argument, Brdf, Row};
-use crate::light::environment::Kernel;
+use super::{Argument, Lobe, Microfacets, Row, twin};
 use crate::units::SlopeVariance;
 
 /// A measured lobe.
@@ -28,14 +27,14 @@ use crate::units::SlopeVariance;
 pub struct Measured {
     /// As on the command line.
     name: String,
-    fit: Arc<Factors>,
+    fit: Arc<LobeFactors>,
     /// What it was widened by.
     widened: SlopeVariance,
 }
 
 /// The factors of a material.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Factors {
+pub struct LobeFactors {
     /// Diffuse albedo, linear RGB: pi times the constant part.
     pub diffuse: DVec3,
     /// Kernels of f: weight, and variance on one axis.
@@ -77,13 +76,13 @@ pub fn published(model: &str, name: &str) -> Result<impl Fn(DVec3, DVec3) -> DVe
 }
 
 impl Measured {
-    fn of_fit(model: &str, name: &str) -> Result<Box<dyn Brdf>, String> {
+    fn of_fit(model: &str, name: &str) -> Result<Box<dyn Lobe>, String> {
         let reflectance = published(model, name)?;
         // The fits do not depend on more than these sixteen tell apart.
         Ok(Box::new(Self::new(&format!("{model}:{name}"), 16, |wi, wo, _| Some(reflectance(wi, wo)))))
     }
 
-    /// Factors a table of measurements: reflectance, RGB, for directions to the light and the eye (the normal is z), which `turns` bins of
+    /// LobeFactors a table of measurements: reflectance, RGB, for directions to the light and the eye (the normal is z), which `turns` bins of
     /// `phi_d` from 0 to 180 degrees are asked for at every pair of `theta_h` and `theta_d`; the third number is the bin's, counted over
     /// all, `(theta_h × 90 + theta_d) × turns + phi_d`. `None` where nothing was measured.
     #[must_use]
@@ -117,7 +116,7 @@ fn colour(tint: &[DVec3; 6], u: f64) -> DVec3 {
     tint.iter().rev().fold(DVec3::ZERO, |sum, c| sum * (1.0 - u) + *c).max(DVec3::ZERO) / (u * u)
 }
 
-impl Brdf for Measured {
+impl Lobe for Measured {
     fn spelling(&self) -> String {
         self.name.clone()
     }
@@ -138,7 +137,7 @@ impl Brdf for Measured {
         Some(SlopeVariance::clamped(self.own_variance()).widen(self.widened))
     }
 
-    fn widen(&self, by: SlopeVariance) -> Box<dyn Brdf> {
+    fn widen(&self, by: SlopeVariance) -> Box<dyn Lobe> {
         Box::new(Self { widened: self.widened.widen(by), ..self.clone() })
     }
 
@@ -154,32 +153,32 @@ impl Brdf for Measured {
         colour(&self.fit.tint, u)
     }
 
-    fn measured(&self) -> Option<&Factors> {
+    fn measured(&self) -> Option<&LobeFactors> {
         Some(&self.fit)
     }
 
-    fn kernel(&self) -> Kernel {
-        Kernel::Ggx
+    fn microfacets(&self) -> Microfacets {
+        Microfacets::Ggx
     }
 
-    fn microfacets(&self) -> Option<super::Beckmann> {
+    fn as_beckmann(&self) -> Option<super::Beckmann> {
         None
     }
 
     /// The numbers are written into the text.
     fn shader(&self) -> Cow<'static, str> {
-        let mut text = include_str!("measured.wgsl").to_owned();
+        let mut text = [include_str!("measured.wgsl"), twin::GAUSSIAN_FACETS, twin::SLOPE_PROFILE].join("\n");
         let _ = write!(
             text,
             "\nconst OWN_VARIANCE: f32 = {:?};\nconst LEAST_DIFFERENCE: f32 = {LEAST_COSINE:?};\n",
             self.own_variance() as f32
         );
-        text += "\n// f(u), u the cosine between normal and half-vector, widened by `base`.\nfn brdf_evaluate(base: f32, u: f32) -> f32 {\n    if u <= 0.0 {\n        return 0.0;\n    }\n    var sum = 0.0;\n";
+        text += "\n// f(u), u the cosine between normal and half-vector, widened by `base`.\nfn lobe_evaluate(base: f32, u: f32) -> f32 {\n    if u <= 0.0 {\n        return 0.0;\n    }\n    var sum = 0.0;\n";
         for (weight, variance) in &self.fit.kernels {
             let _ =
                 writeln!(text, "    sum += {:?} * kernel({:?} + base, u);", *weight as f32, *variance as f32);
         }
-        text += "    return sum;\n}\n\n// g, of u = wi·wh.\nfn brdf_tint(u: f32) -> vec3<f32> {\n    let held = clamp(u, LEAST_DIFFERENCE, 1.0);\n    let x = 1.0 - held;\n    var sum = vec3<f32>(0.0);\n";
+        text += "    return sum;\n}\n\n// g, of u = wi·wh.\nfn lobe_tint(u: f32) -> vec3<f32> {\n    let held = clamp(u, LEAST_DIFFERENCE, 1.0);\n    let x = 1.0 - held;\n    var sum = vec3<f32>(0.0);\n";
         for c in self.fit.tint.iter().rev() {
             let _ = writeln!(
                 text,

@@ -9,7 +9,7 @@ const HARMONICS: u32 = 2u;
 
 struct Environment {
     // From directions of the world to the environment's own.
-    turn: mat3x3<f32>,
+    rotation: mat3x3<f32>,
     // Nine harmonics of its light, small bright sources apart; and in w of the first three, red, green and blue of the least that a normal receives.
     irradiance: array<vec4<f32>, 9>,
     // Texels on a side of the cubes' finest level, and how many levels there are.

@@ -4,7 +4,8 @@ use std::sync::{Arc, OnceLock};
 
 use glam::DMat3;
 
-use super::{Cube, Environment, HalfVectors, Irradiance, Kernel, Suns, without_suns};
+use super::{Cube, Environment, HalfVectors, Irradiance, Suns, without_suns};
+use crate::brdf::Microfacets;
 use crate::light::Light;
 
 /// How lobes of normals meet an environment's highlights.
@@ -70,19 +71,19 @@ impl FilteredEnvironment {
 
     /// The cube that these microfacets have blurred.
     #[must_use]
-    pub fn prefiltered(&self, kernel: Kernel) -> &Cube {
-        let made = match kernel {
-            Kernel::Beckmann => &self.beckmann,
-            Kernel::Ggx => &self.ggx,
+    pub fn prefiltered(&self, microfacets: Microfacets) -> &Cube {
+        let made = match microfacets {
+            Microfacets::Beckmann => &self.beckmann,
+            Microfacets::Ggx => &self.ggx,
         };
-        made.get_or_init(|| kernel.filter(&self.radiance))
+        made.get_or_init(|| microfacets.filter(&self.radiance))
     }
 
     /// Makes now what a technique wants of it. What is made when first asked for is made by all threads together, and must not be asked for
     /// first from within what they already do together.
-    pub fn make(&self, technique: Technique, kernel: Kernel) {
+    pub fn make(&self, technique: Technique, microfacets: Microfacets) {
         match technique {
-            Technique::Prefiltered => drop(self.prefiltered(kernel)),
+            Technique::Prefiltered => drop(self.prefiltered(microfacets)),
             Technique::Harmonics => drop(self.half_vectors()),
         }
     }
@@ -96,25 +97,25 @@ impl FilteredEnvironment {
 
 /// The environment that a scene stands in.
 #[derive(Clone, Debug)]
-pub struct Surroundings {
-    /// The light itself.
-    pub environment: Arc<Environment>,
+pub struct SceneEnvironment {
+    /// The light itself, as a picture by latitude and longitude.
+    pub map: Arc<Environment>,
     /// The same, filtered.
     pub filtered: Arc<FilteredEnvironment>,
     /// How far it is turned around the vertical, in radians: what was ahead moves to the right.
-    pub turn: f64,
+    pub rotation: f64,
     /// How highlights look it up.
     pub technique: Technique,
 }
 
-impl Surroundings {
+impl SceneEnvironment {
     /// An environment around a scene.
     #[must_use]
     pub fn new(environment: Environment) -> Self {
         Self {
             filtered: FilteredEnvironment::new(&environment).into(),
-            environment: environment.into(),
-            turn: 0.0,
+            map: environment.into(),
+            rotation: 0.0,
             technique: Technique::default(),
         }
     }
@@ -122,7 +123,7 @@ impl Surroundings {
     /// From directions of the world to the environment's own.
     #[must_use]
     pub fn to_environment(&self) -> DMat3 {
-        DMat3::from_rotation_y(self.turn)
+        DMat3::from_rotation_y(self.rotation)
     }
 
     /// The small bright sources, as lights of the world.
@@ -148,9 +149,9 @@ mod tests {
 
     #[test]
     fn what_was_ahead_turns_to_the_right() {
-        let turned = Surroundings {
-            turn: std::f64::consts::FRAC_PI_2,
-            ..Surroundings::new(smooth(Size { width: 32, height: 16 }))
+        let turned = SceneEnvironment {
+            rotation: std::f64::consts::FRAC_PI_2,
+            ..SceneEnvironment::new(smooth(Size { width: 32, height: 16 }))
         };
         // What is now seen on the right is what the picture has ahead.
         assert!((turned.to_environment() * DVec3::X - DVec3::NEG_Z).length() < 1e-15);

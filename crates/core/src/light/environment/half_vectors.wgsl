@@ -36,17 +36,11 @@ fn half_vector_between(around: ViewsAround, i: u32) -> vec3<f32> {
 fn over_half_vectors(wo: vec3<f32>, mu: vec3<f32>, spread: f32, printed: bool) -> vec3<f32> {
     let around = views_around(wo);
     var sum = vec3<f32>(0.0);
-    // (cos m phi, sin m phi) sin^m theta = Re, Im of (x + iy)^m.
     var power = vec2<f32>(1.0, 0.0);
-    var diagonal = sqrt(1.0 / (4.0 * PI));
+    var diagonal = 0.0;
     for (var m = 0u; m <= HALF_VECTOR_ORDER; m++) {
-        let mf = f32(m);
-        if m > 0u {
-            diagonal *= sqrt((2.0 * mf + 1.0) / (2.0 * mf));
-        }
-        var before = 0.0;
-        var now = diagonal * select(1.0, sqrt(2.0), m > 0u);
-        var ratio = 1.0;
+        diagonal = harmonic_diagonal(diagonal, m);
+        var h = first_harmonic(diagonal, m);
         for (var l = m; l <= HALF_VECTOR_ORDER; l++) {
             let i = l * l + l;
             let rate = f32(l * select(l + 1u, l, printed));
@@ -55,14 +49,10 @@ fn over_half_vectors(wo: vec3<f32>, mu: vec3<f32>, spread: f32, printed: bool) -
             if m > 0u {
                 c += half_vector_between(around, i - m) * power.y;
             }
-            sum += zonal * now * c;
-            let next = sh_ratio(f32(l) + 1.0, mf);
-            let after = next * mu.z * now - select(0.0, next / ratio, l > m) * before;
-            before = now;
-            now = after;
-            ratio = next;
+            sum += zonal * h.value * c;
+            h = next_harmonic(h, l, m, mu.z);
         }
-        power = vec2<f32>(power.x * mu.x - power.y * mu.y, power.x * mu.y + power.y * mu.x);
+        power = next_power(power, mu);
     }
     return max(sum, vec3<f32>(0.0));
 }

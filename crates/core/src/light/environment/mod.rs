@@ -17,10 +17,9 @@ mod sampling;
 mod sun;
 
 pub use cube::{Cube, cube_direction};
-pub use filtered::{FilteredEnvironment, Surroundings, Technique};
+pub use filtered::{FilteredEnvironment, SceneEnvironment, Technique};
 pub use half_vectors::{HALF_VECTOR_ORDER, HalfVectors, VIEWS};
 pub use harmonics::{Harmonics, IRRADIANCE_ORDER, Irradiance, zonal_of_normals};
-pub use prefilter::Kernel;
 pub use sampling::EnvironmentSampler;
 pub use sun::{Suns, without_suns};
 

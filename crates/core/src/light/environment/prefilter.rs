@@ -10,17 +10,9 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 
 use super::Cube;
+use crate::brdf::Microfacets;
 use crate::sphere::frame;
 use crate::units::SlopeVariance;
-
-/// The microfacets that a cube is filtered by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Kernel {
-    /// Beckmann's: Gaussian slopes.
-    Beckmann,
-    /// GGX.
-    Ggx,
-}
 
 /// Directions, from the lobe's middle out and around.
 const RINGS: usize = 16;
@@ -29,29 +21,7 @@ const SPOKES: usize = 12;
 /// Rings of a length's integral, which costs little.
 const FINE_RINGS: usize = 256;
 
-impl Kernel {
-    /// Squared tangent of the angle within which this share of the facets is, by projected area.
-    #[must_use]
-    pub fn quantile(self, alpha_squared: f64, share: f64) -> f64 {
-        match self {
-            Self::Beckmann => -alpha_squared * (-share).ln_1p(),
-            Self::Ggx => alpha_squared * share / (1.0 - share),
-        }
-    }
-
-    /// D at a squared tangent.
-    #[must_use]
-    pub fn facets(self, alpha_squared: f64, tan_squared: f64) -> f64 {
-        let cos4 = (1.0 + tan_squared).powi(-2);
-        match self {
-            Self::Beckmann => (-tan_squared / alpha_squared).exp() / (PI * alpha_squared * cos4),
-            Self::Ggx => {
-                let root = 1.0 + tan_squared / alpha_squared;
-                1.0 / (PI * alpha_squared * cos4 * root * root)
-            }
-        }
-    }
-
+impl Microfacets {
     /// Perceptual roughness of a lobe: the root of alpha, alpha² being twice the variance.
     #[must_use]
     pub fn roughness(width: SlopeVariance) -> f64 {
@@ -111,7 +81,7 @@ impl Kernel {
                 if cos <= 0.0 {
                     continue;
                 }
-                let share = 4.0 / ((RINGS * SPOKES) as f64 * self.facets(alpha_squared, tan_squared));
+                let share = 4.0 / ((RINGS * SPOKES) as f64 * self.d_of_tangent(alpha_squared, tan_squared));
                 let lod = 0.5 * (share / texel).log2();
                 for spoke in 0..SPOKES {
                     // Each ring turned by the golden ratio, so that spokes do not line up.
@@ -147,12 +117,12 @@ mod tests {
     #[test]
     fn roughness_nought_is_the_map_and_a_constant_stays_one() {
         let radiance = Cube::of(&smooth(Size { width: 128, height: 64 }));
-        for kernel in [Kernel::Beckmann, Kernel::Ggx] {
-            assert!(kernel.filter(&radiance).texels(0) == radiance.texels(0));
+        for microfacets in [Microfacets::Beckmann, Microfacets::Ggx] {
+            assert!(microfacets.filter(&radiance).texels(0) == radiance.texels(0));
             let one =
                 Environment::new(Grid::from_fn(Size { width: 64, height: 32 }, |_, _| Vec3::splat(2.0)))
                     .unwrap();
-            let cube = kernel.filter(&Cube::of(&one));
+            let cube = microfacets.filter(&Cube::of(&one));
             for level in 0..cube.levels() {
                 assert!(cube.texels(level).iter().all(|v| (*v - Vec3::splat(2.0)).length() < 1e-5));
             }
@@ -164,8 +134,8 @@ mod tests {
         let radiance = Cube::of(&smooth(Size { width: 512, height: 256 }));
         let up = DVec3::new(0.36, 0.8, 0.48);
         let (x, y) = frame(up);
-        for kernel in [Kernel::Beckmann, Kernel::Ggx] {
-            let cube = kernel.filter(&radiance);
+        for microfacets in [Microfacets::Beckmann, Microfacets::Ggx] {
+            let cube = microfacets.filter(&radiance);
             for level in 1..cube.levels() {
                 let alpha_squared = (level as f64 / (cube.levels() - 1) as f64).powi(4);
                 let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
@@ -177,7 +147,8 @@ mod tests {
                         let fall = start + (end - start) * (node + 1.0) / 2.0;
                         let cos = 1.0 - fall;
                         let tan_squared = (1.0 - cos) / (1.0 + cos);
-                        let density = kernel.facets(alpha_squared, tan_squared) * cos * w * (end - start);
+                        let density =
+                            microfacets.d_of_tangent(alpha_squared, tan_squared) * cos * w * (end - start);
                         for k in 0..16 {
                             let (s, c) = (TAU * f64::from(k) / 16.0).sin_cos();
                             let sin = (1.0 - cos * cos).sqrt();
@@ -189,7 +160,7 @@ mod tests {
                 }
                 let (got, expected) = (cube.lookup(up, level as f64), sum / weight);
                 // Sixteen rings, and what look-ups blur besides.
-                assert!((got - expected).length() < 0.02, "{kernel:?} {level}: {got} {expected}");
+                assert!((got - expected).length() < 0.02, "{microfacets:?} {level}: {got} {expected}");
             }
         }
     }

@@ -1,8 +1,8 @@
-// How a surface answers a light: a lobe, what multiplies it, and a diffuse part. Twin of reflection.rs.
+// How a surface answers a light: a lobe, what multiplies it, and a diffuse part. Twin of shading.rs.
 
 const PI: f32 = 3.14159265358979;
 
-// Models, as numbered by `Model::index`.
+// Models, as numbered by `ShadingModel::index`.
 const TAN: u32 = 0u;
 const HAN: u32 = 1u;
 const SMITH: u32 = 2u;
@@ -13,7 +13,7 @@ const SHADOWED: u32 = 4u;
 const LEAST_COSINE: f32 = 0.05;
 
 // A path from light to eye, in the tangent frame.
-struct Way {
+struct Directions {
     // To the light.
     wi: vec3<f32>,
     // To the eye.
@@ -25,11 +25,11 @@ struct Way {
 }
 
 // What a place is made of, apart from its normals.
-struct Finish {
+struct SurfaceParams {
     // Diffuse albedo, linear RGB.
     diffuse: vec3<f32>,
     // What widens the lobe here: a slope variance.
-    gloss: f32,
+    roughness: f32,
     // Reflectance at normal incidence; linear RGB.
     specular: vec3<f32>,
 }
@@ -37,31 +37,31 @@ struct Finish {
 alias Table = array<vec4<f32>, 3 * TABLE>;
 
 // A lobe in a model: everything about a material that does not change over its surface.
-struct Reflection {
+struct Brdf {
     // The lobe's own number; see its file.
     base: f32,
     // TAN, HAN, SMITH, MASKED or SHADOWED.
-    model: u32,
+    shading: u32,
     // 1: factors are taken at the lobes' means, as the papers print it.
     at_means: u32,
-    // The least gloss that `table` is made for, and how much more the most is.
-    gloss: f32,
+    // The least roughness that `table` is made for, and how much more the most is.
+    roughness: f32,
     span: f32,
-    // What the method wants to know of the lobe, entry by entry, three of these each: at eleven glosses, and of the diffuse lobe.
+    // What the method wants to know of the lobe, entry by entry, three of these each: at eleven roughnesses, and of the diffuse lobe.
     table: Table,
 }
 
-// An entry of the table at any gloss: between two that it has, by equal steps of the root, each carried on as heat spreads on a sphere, at
-// the rate `decay`. `range` is the least gloss and the span. (The table comes by pointer: copied for every entry, it is what time goes into.)
-fn tabulated(table: ptr<function, Table>, range: vec2<f32>, entry: u32, gloss: f32, decay: f32) -> f32 {
+// An entry of the table at any roughness: between two that it has, by equal steps of the root, each carried on as heat spreads on a sphere, at
+// the rate `decay`. `range` is the least roughness and the span. (The table comes by pointer: copied for every entry, it is what time goes into.)
+fn tabulated(table: ptr<function, Table>, range: vec2<f32>, entry: u32, roughness: f32, decay: f32) -> f32 {
     if range.y <= 0.0 {
         return (*table)[3u * entry].x;
     }
-    let t = 10.0 * sqrt(clamp((gloss - range.x) / range.y, 0.0, 1.0));
+    let t = 10.0 * sqrt(clamp((roughness - range.x) / range.y, 0.0, 1.0));
     let k = min(u32(t), 9u);
     let i = k + 1u;
     let at = range.x + range.y * vec2<f32>(f32(k * k), f32(i * i)) / 100.0;
-    let carried = exp(decay * (at - gloss));
+    let carried = exp(decay * (at - roughness));
     let below = (*table)[3u * entry + k / 4u][k % 4u] * carried.x;
     let above = (*table)[3u * entry + i / 4u][i % 4u] * carried.y;
     return mix(below, above, t - f32(k));
@@ -73,14 +73,14 @@ fn tabulated_diffuse(table: ptr<function, Table>, entry: u32) -> f32 {
 }
 
 // The path between two unit vectors. Only where both are above the surface (z > 0) is anything reflected.
-fn way_between(wi: vec3<f32>, wo: vec3<f32>) -> Way {
+fn directions_between(wi: vec3<f32>, wo: vec3<f32>) -> Directions {
     let wh = normalize(wi + wo);
-    return Way(wi, wo, wh, dot(wi, wh));
+    return Directions(wi, wo, wh, dot(wi, wh));
 }
 
 // The Fresnel term: Schlick's; for Han et al. the colour itself.
-fn fresnel(model: u32, specular: vec3<f32>, u: f32) -> vec3<f32> {
-    if model == HAN {
+fn fresnel(shading: u32, specular: vec3<f32>, u: f32) -> vec3<f32> {
+    if shading == HAN {
         return specular;
     }
     let x = clamp(1.0 - u, 0.0, 1.0);
@@ -89,52 +89,52 @@ fn fresnel(model: u32, specular: vec3<f32>, u: f32) -> vec3<f32> {
 }
 
 // What is left for the diffuse part.
-fn diffuse_share(model: u32, fresnel: vec3<f32>) -> vec3<f32> {
-    return select(1.0 - fresnel, vec3<f32>(1.0), model == HAN);
+fn diffuse_share(shading: u32, fresnel: vec3<f32>) -> vec3<f32> {
+    return select(1.0 - fresnel, vec3<f32>(1.0), shading == HAN);
 }
 
 // Slope variance of the lobe at a place.
-fn lobe_width(reflection: Reflection, gloss: f32) -> f32 {
-    return brdf_variance(reflection.base) + gloss;
+fn brdf_width(brdf: Brdf, roughness: f32) -> f32 {
+    return lobe_variance(brdf.base) + roughness;
 }
 
 // Projected area of what a facet is made of, as it faces a direction at this cosine.
 fn visible_area(width: f32, cosine: f32) -> f32 {
-    return brdf_visible_area(cosine, sqrt(max(1.0 - cosine * cosine, 0.0) * width));
+    return lobe_visible_area(cosine, sqrt(max(1.0 - cosine * cosine, 0.0) * width));
 }
 
-// The factor c at a normal, for the lobe that the gloss makes.
-fn factor(reflection: Reflection, n: vec3<f32>, way: Way, gloss: f32) -> f32 {
-    let i = dot(n, way.wi);
-    let o = dot(n, way.wo);
-    if reflection.model == TAN {
+// The factor c at a normal, for the lobe that the roughness makes.
+fn factor(brdf: Brdf, n: vec3<f32>, directions: Directions, roughness: f32) -> f32 {
+    let i = dot(n, directions.wi);
+    let o = dot(n, directions.wo);
+    if brdf.shading == TAN {
         return 1.0 / max(o, LEAST_COSINE);
     }
-    if reflection.model == HAN {
+    if brdf.shading == HAN {
         return max(i, 0.0);
     }
-    if o <= 0.0 || (i <= 0.0 && reflection.model != MASKED) {
+    if o <= 0.0 || (i <= 0.0 && brdf.shading != MASKED) {
         return 0.0;
     }
-    let width = lobe_width(reflection, gloss);
-    if reflection.model == MASKED {
+    let width = brdf_width(brdf, roughness);
+    if brdf.shading == MASKED {
         return 0.25 / visible_area(width, o);
     }
-    if reflection.model == SHADOWED {
+    if brdf.shading == SHADOWED {
         let hidden_from_light = visible_area(width, i) / i - 1.0;
         return 0.25 / (visible_area(width, o) + o * hidden_from_light);
     }
-    return brdf_masking(i, width) * brdf_masking(o, width) / (4.0 * o);
+    return lobe_masking(i, width) * lobe_masking(o, width) / (4.0 * o);
 }
 
 // Light that one normal sends along the way, per unit of irradiance.
-fn facet(reflection: Reflection, n: vec3<f32>, finish: Finish, way: Way) -> vec3<f32> {
-    let lambert = finish.diffuse * (max(dot(n, way.wi), 0.0) / PI);
+fn facet(brdf: Brdf, n: vec3<f32>, params: SurfaceParams, directions: Directions) -> vec3<f32> {
+    let lambert = params.diffuse * (max(dot(n, directions.wi), 0.0) / PI);
     if !SPECULAR {
         return lambert;
     }
-    let f = fresnel(reflection.model, finish.specular, way.u);
-    let diffuse = diffuse_share(reflection.model, f) * lambert;
-    let lobe = brdf_evaluate(brdf_widen(reflection.base, finish.gloss), dot(n, way.wh));
-    return diffuse + brdf_tint(way.u) * f * (lobe * factor(reflection, n, way, finish.gloss));
+    let f = fresnel(brdf.shading, params.specular, directions.u);
+    let diffuse = diffuse_share(brdf.shading, f) * lambert;
+    let lobe = lobe_evaluate(lobe_widen(brdf.base, params.roughness), dot(n, directions.wh));
+    return diffuse + lobe_tint(directions.u) * f * (lobe * factor(brdf, n, directions, params.roughness));
 }

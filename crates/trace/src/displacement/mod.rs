@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use glam::{DVec2, DVec3};
-use ndfmap_core::scene::{Mesh, Relief as Heights, Scene, Vertex};
+use ndfmap_core::scene::{Displacement as Heights, Mesh, Scene, Vertex};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::cwbvh::{CwBvh, builder::build_cwbvh};
@@ -33,7 +33,7 @@ const LEAST_GROUP: u16 = 4;
 const MOST_GROUPS: usize = 1 << 21;
 
 /// Meshes of a scene that have relief, ready to be hit.
-pub struct Relief {
+pub struct DisplacedMeshes {
     pieces: Vec<Piece>,
     groups: Vec<Group>,
     hierarchy: Option<CwBvh>,
@@ -200,14 +200,14 @@ impl Base<'_> {
     }
 }
 
-impl Relief {
+impl DisplacedMeshes {
     /// Puts boxes around what has relief in a scene.
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
         let mut shared: Vec<Option<Arc<Extremes>>> = vec![None; scene.materials.len()];
         let mut pieces = Vec::new();
         for object in &scene.objects {
-            let Some(heights) = &scene.materials[object.material].relief else { continue };
+            let Some(heights) = &scene.materials[object.material].displacement else { continue };
             let extremes = shared[object.material]
                 .get_or_insert_with(|| Arc::new(Extremes::new(&heights.heights)))
                 .clone();

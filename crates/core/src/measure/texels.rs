@@ -10,7 +10,7 @@ use rand::{SeedableRng, seq::SliceRandom};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
-use crate::brdf::Brdf;
+use crate::brdf::Lobe;
 use crate::grid::Size;
 use crate::ndf::Method;
 use crate::pyramid::{Pyramid, footprint, level_sizes};
@@ -31,26 +31,26 @@ pub const SAMPLED_TEXELS: usize = 256;
 /// 48 a side are enough for any wide lobe; 160 keep the narrowest affordable, and being an even sample
 /// they stay unbiased when they are sparse.
 #[must_use]
-pub fn lattice_for(brdf: &dyn Brdf) -> DiskLattice {
-    let deviation = brdf.slope_variance().map_or(1.0, |v| v.get().sqrt());
+pub fn lattice_for(lobe: &dyn Lobe) -> DiskLattice {
+    let deviation = lobe.slope_variance().map_or(1.0, |v| v.get().sqrt());
     let side = (2.0 / (0.7 * deviation)).ceil().clamp(48.0, 160.0);
     DiskLattice::new(side as usize, DISK_RADIUS)
 }
 
 /// Fine normals in memory, and the BRDF and directions the truth is asked for.
-pub struct Truth<'a> {
+pub struct TexelTruth<'a> {
     size: Size,
     normals: Vec<[f32; 3]>,
-    brdf: &'a dyn Brdf,
+    lobe: &'a dyn Lobe,
     lattice: &'a DiskLattice,
     /// Half-angle beyond which the lobe is below 1e-12 of its peak.
     reach: f64,
 }
 
-impl<'a> Truth<'a> {
+impl<'a> TexelTruth<'a> {
     /// Reads all of the surface.
     #[must_use]
-    pub fn new(surface: &dyn Surface, brdf: &'a dyn Brdf, lattice: &'a DiskLattice) -> Self {
+    pub fn new(surface: &dyn Surface, lobe: &'a dyn Lobe, lattice: &'a DiskLattice) -> Self {
         let size = surface.size();
         let mut normals = Vec::with_capacity(size.area());
         let mut row = SurfaceRow::flat(size.width);
@@ -58,7 +58,7 @@ impl<'a> Truth<'a> {
             surface.read_row(y, &mut row);
             normals.extend((0..size.width).map(|i| row.normal(i).to_array()));
         }
-        Self { size, normals, brdf, lattice, reach: reach(brdf) }
+        Self { size, normals, lobe, lattice, reach: reach(lobe) }
     }
 
     /// Size of the finest level.
@@ -93,7 +93,7 @@ impl<'a> Truth<'a> {
             for (u, w) in scratch.iter_mut().zip(&row[first..last]) {
                 *u = w.dot(n);
             }
-            self.brdf.evaluate_all(scratch);
+            self.lobe.evaluate_all(scratch);
             for (out, f) in out[range.start + first..].iter_mut().zip(scratch.iter()) {
                 *out += weight * f;
             }
@@ -118,15 +118,15 @@ impl<'a> Truth<'a> {
 }
 
 /// Angle beyond which a falling lobe stays below 1e-12 of its peak.
-fn reach(brdf: &dyn Brdf) -> f64 {
-    let peak = brdf.evaluate(1.0);
+fn reach(lobe: &dyn Lobe) -> f64 {
+    let peak = lobe.evaluate(1.0);
     let (mut near, mut far) = (0.0, std::f64::consts::FRAC_PI_2);
-    if brdf.evaluate(1e-3) > 1e-12 * peak {
+    if lobe.evaluate(1e-3) > 1e-12 * peak {
         return far;
     }
     for _ in 0..60 {
         let middle = (near + far) / 2.0;
-        if brdf.evaluate(f64::cos(middle)) > 1e-12 * peak { near = middle } else { far = middle }
+        if lobe.evaluate(f64::cos(middle)) > 1e-12 * peak { near = middle } else { far = middle }
     }
     far
 }
@@ -146,7 +146,7 @@ pub struct TrueLevel {
 /// Levels with more than [`MAX_TEXELS`] texels are sampled, with a fixed seed, so that two methods are
 /// measured on the same texels. A level in whose texels those of a finer one nest is averaged from it.
 #[must_use]
-pub fn true_levels(truth: &Truth<'_>, progress: &(dyn Fn(f64) + Sync)) -> Vec<TrueLevel> {
+pub fn true_levels(truth: &TexelTruth<'_>, progress: &(dyn Fn(f64) + Sync)) -> Vec<TrueLevel> {
     let sizes = level_sizes(truth.size);
     let mut levels: Vec<TrueLevel> = Vec::with_capacity(sizes.len());
     for (level, size) in sizes.iter().enumerate() {
@@ -202,11 +202,11 @@ fn mean_of_nested(finer: &TrueLevel, fine: Size, coarse: Size, (x, y): (usize, u
 pub fn level_error(
     pyramid: &Pyramid,
     method: &dyn Method,
-    brdf: &dyn Brdf,
+    lobe: &dyn Lobe,
     lattice: &DiskLattice,
     truth: &TrueLevel,
 ) -> f64 {
-    let evaluator = method.evaluator(brdf, &lattice.directions);
+    let evaluator = method.evaluator(lobe, &lattice.directions);
     let sums: Vec<(f64, f64)> = truth
         .texels
         .par_iter()
@@ -229,25 +229,25 @@ mod tests {
 
     #[test]
     fn culling_changes_nothing() {
-        let brdf = brdf::parse("blinn-phong:200").unwrap();
-        let lattice = lattice_for(&*brdf);
+        let lobe = brdf::parse("blinn-phong:200").unwrap();
+        let lattice = lattice_for(&*lobe);
         let surface = (procedural::find("armour").unwrap().build)(Size::new(32, 32).unwrap());
-        let mut truth = Truth::new(&*surface, &*brdf, &lattice);
+        let mut truth = TexelTruth::new(&*surface, &*lobe, &lattice);
         assert!(truth.reach < 1.0);
         let level = Size::new(4, 4).unwrap();
         let fast = truth.texel(level, 1, 2);
         truth.reach = 1.6;
         let slow = truth.texel(level, 1, 2);
-        let peak = brdf.evaluate(1.0);
+        let peak = lobe.evaluate(1.0);
         assert!(fast.iter().zip(&slow).all(|(a, b)| (a - b).abs() < 1e-11 * peak));
     }
 
     #[test]
     fn nested_levels_equal_direct_ones() {
-        let brdf = brdf::parse("blinn-phong:30").unwrap();
+        let lobe = brdf::parse("blinn-phong:30").unwrap();
         let lattice = DiskLattice::new(16, DISK_RADIUS);
         let surface = (procedural::find("foil").unwrap().build)(Size::new(32, 32).unwrap());
-        let truth = Truth::new(&*surface, &*brdf, &lattice);
+        let truth = TexelTruth::new(&*surface, &*lobe, &lattice);
         let levels = true_levels(&truth, &|_| ());
         for level in &levels[2..] {
             let size = Size::new(32 >> level.level, 32 >> level.level).unwrap();

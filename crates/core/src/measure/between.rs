@@ -10,8 +10,8 @@ use rand::{SeedableRng, seq::SliceRandom};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
-use crate::brdf::Brdf;
-use crate::error::Truth;
+use super::TexelTruth;
+use crate::brdf::Lobe;
 use crate::grid::Size;
 use crate::lookup::{Tap, Texels};
 use crate::ndf::{Evaluator, Method};
@@ -51,7 +51,7 @@ pub struct FilteringError {
 /// Corners of every level that has more than one texel, with their truth; the same for every method.
 #[must_use]
 pub fn true_corners(
-    truth: &Truth<'_>,
+    truth: &TexelTruth<'_>,
     wraps: Wraps,
     levels: &[usize],
     progress: &(dyn Fn(f64) + Sync),
@@ -107,11 +107,11 @@ pub fn evaluate_neighbours(
 pub fn filtering_error(
     pyramid: &Pyramid,
     method: &dyn Method,
-    brdf: &dyn Brdf,
+    lobe: &dyn Lobe,
     lattice: &DiskLattice,
     truth: &TrueCorners,
 ) -> FilteringError {
-    let evaluator = method.evaluator(brdf, &lattice.directions);
+    let evaluator = method.evaluator(lobe, &lattice.directions);
     let level = truth.level;
     let of_corner = |(corner, lobes): (&Corner, &[Vec<f64>; 4])| {
         let mut sums = [Squares::default(); 3];
@@ -175,21 +175,21 @@ impl Squares {
 mod tests {
     use super::*;
     use crate::bake::Bake;
-    use crate::error::DISK_RADIUS;
+    use crate::measure::DISK_RADIUS;
     use crate::pyramid::Precision;
     use crate::{brdf, ndf, procedural};
 
     /// Errors at level 3 of a built-in map.
     fn errors(map: &str, method: &str) -> FilteringError {
         let surface = (procedural::find(map).unwrap().build)(Size::new(128, 128).unwrap());
-        let brdf = brdf::parse("blinn-phong:50").unwrap();
+        let lobe = brdf::parse("blinn-phong:50").unwrap();
         let lattice = DiskLattice::new(40, DISK_RADIUS);
-        let truth = Truth::new(&*surface, &*brdf, &lattice);
+        let truth = TexelTruth::new(&*surface, &*lobe, &lattice);
         let corners = true_corners(&truth, surface.wraps(), &[3], &|_| ());
         let method = ndf::parse(method).unwrap();
         let bake =
             Bake { surface: &*surface, method: &*method, precision: Precision::Half, progress: &|_| () };
-        filtering_error(&bake.to_pyramid().0, &*method, &*brdf, &lattice, &corners[0])
+        filtering_error(&bake.to_pyramid().0, &*method, &*lobe, &lattice, &corners[0])
     }
 
     #[test]

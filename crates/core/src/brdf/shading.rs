@@ -8,12 +8,12 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use crate::brdf::{Argument, Brdf};
+use crate::brdf::{Argument, Lobe};
 use crate::units::SlopeVariance;
 
 /// Which factor and which Fresnel term go with the lobe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Model {
+pub enum ShadingModel {
     /// Tan et al. 2005, section 3, a Cook-Torrance model without attenuation: `c = 1/(n·wo)`, Schlick's F, and
     /// `1 - F` on the diffuse part. The cosine is held to [`LEAST_COSINE`], below which the paper says nothing.
     Tan,
@@ -31,7 +31,7 @@ pub enum Model {
 /// Least `n·wo` that Tan et al.'s model divides by: a normal turned further from the eye counts as one at 87 degrees.
 pub const LEAST_COSINE: f64 = 0.05;
 
-impl Model {
+impl ShadingModel {
     /// Every model.
     pub const ALL: [Self; 5] = [Self::Tan, Self::Han, Self::Smith, Self::Masked, Self::Shadowed];
 
@@ -74,7 +74,7 @@ impl Model {
 
 /// A path from light to eye, in the tangent frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Way {
+pub struct Directions {
     /// To the light.
     pub wi: DVec3,
     /// To the eye.
@@ -85,7 +85,7 @@ pub struct Way {
     pub u: f64,
 }
 
-impl Way {
+impl Directions {
     /// The path between two unit vectors; `None` where light or eye is below the surface, and nothing is reflected.
     #[must_use]
     pub fn new(wi: DVec3, wo: DVec3) -> Option<Self> {
@@ -103,35 +103,35 @@ impl Way {
 
 /// What a place is made of, apart from its normals.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Finish {
+pub struct SurfaceParams {
     /// Diffuse albedo, linear RGB.
     pub diffuse: DVec3,
     /// Reflectance at normal incidence, or Han et al.'s `K_s`; linear RGB.
     pub specular: DVec3,
-    /// What widens the lobe here, as a gloss map says.
-    pub gloss: SlopeVariance,
+    /// What widens the lobe here, as a roughness map says.
+    pub roughness: SlopeVariance,
 }
 
 /// A lobe in a model: everything about a material that does not change over its surface.
 #[derive(Debug)]
-pub struct Reflection {
+pub struct Brdf {
     /// The lobe, where it is sharpest. Lambert leaves the diffuse part alone.
-    pub lobe: Box<dyn Brdf>,
+    pub lobe: Box<dyn Lobe>,
     /// Its model.
-    pub model: Model,
+    pub shading: ShadingModel,
 }
 
-impl Reflection {
+impl Brdf {
     /// Slope variance of the lobe at a place.
     #[must_use]
-    pub fn width(&self, gloss: SlopeVariance) -> SlopeVariance {
-        self.lobe.slope_variance().unwrap_or(SlopeVariance::ZERO).widen(gloss)
+    pub fn width(&self, roughness: SlopeVariance) -> SlopeVariance {
+        self.lobe.slope_variance().unwrap_or(SlopeVariance::ZERO).widen(roughness)
     }
 
     /// Colour of the highlight at `u = wi·wh`: Fresnel's term, and the lobe's own.
     #[must_use]
     pub fn fresnel(&self, specular: DVec3, u: f64) -> DVec3 {
-        self.lobe.tint(u) * self.model.fresnel(specular, u)
+        self.lobe.tint(u) * self.shading.fresnel(specular, u)
     }
 
     /// False for a lobe of the light's direction, which is the diffuse part already.
@@ -140,47 +140,49 @@ impl Reflection {
         self.lobe.argument() == Argument::Half
     }
 
-    /// The factor c at a normal, for the lobe that the gloss makes.
+    /// The factor c at a normal, for the lobe that the roughness makes.
     #[must_use]
-    pub fn factor(&self, n: DVec3, way: &Way, gloss: SlopeVariance) -> f64 {
-        let (i, o) = (n.dot(way.wi), n.dot(way.wo));
-        match self.model {
-            Model::Tan => 1.0 / o.max(LEAST_COSINE),
-            Model::Han => i.max(0.0),
-            Model::Smith if i <= 0.0 || o <= 0.0 => 0.0,
-            Model::Smith => {
-                let width = self.width(gloss);
+    pub fn factor(&self, n: DVec3, directions: &Directions, roughness: SlopeVariance) -> f64 {
+        let (i, o) = (n.dot(directions.wi), n.dot(directions.wo));
+        match self.shading {
+            ShadingModel::Tan => 1.0 / o.max(LEAST_COSINE),
+            ShadingModel::Han => i.max(0.0),
+            ShadingModel::Smith if i <= 0.0 || o <= 0.0 => 0.0,
+            ShadingModel::Smith => {
+                let width = self.width(roughness);
                 self.lobe.masking(i, width) * self.lobe.masking(o, width) / (4.0 * o)
             }
-            Model::Masked | Model::Shadowed if o <= 0.0 => 0.0,
-            Model::Masked => 0.25 / self.visible_area(o, gloss),
-            Model::Shadowed if i <= 0.0 => 0.0,
-            Model::Shadowed => {
-                let hidden_from_light = self.visible_area(i, gloss) / i - 1.0;
-                0.25 / (self.visible_area(o, gloss) + o * hidden_from_light)
+            ShadingModel::Masked | ShadingModel::Shadowed if o <= 0.0 => 0.0,
+            ShadingModel::Masked => 0.25 / self.visible_area(o, roughness),
+            ShadingModel::Shadowed if i <= 0.0 => 0.0,
+            ShadingModel::Shadowed => {
+                let hidden_from_light = self.visible_area(i, roughness) / i - 1.0;
+                0.25 / (self.visible_area(o, roughness) + o * hidden_from_light)
             }
         }
     }
 
     /// Projected area of what a facet is made of, as it faces a direction at this cosine.
-    fn visible_area(&self, cosine: f64, gloss: SlopeVariance) -> f64 {
+    fn visible_area(&self, cosine: f64, roughness: SlopeVariance) -> f64 {
         let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
-        self.lobe.visible_area(cosine, sine * self.width(gloss).get().sqrt())
+        self.lobe.visible_area(cosine, sine * self.width(roughness).get().sqrt())
     }
 
     /// Light that one normal sends along the way, per unit of irradiance.
     #[must_use]
-    pub fn facet(&self, n: DVec3, finish: &Finish, way: &Way) -> DVec3 {
-        let fresnel = self.model.fresnel(finish.specular, way.u);
-        let diffuse = self.model.diffuse_share(fresnel) * finish.diffuse * (n.dot(way.wi).max(0.0) / PI);
+    pub fn facet(&self, n: DVec3, params: &SurfaceParams, directions: &Directions) -> DVec3 {
+        let fresnel = self.shading.fresnel(params.specular, directions.u);
+        let diffuse =
+            self.shading.diffuse_share(fresnel) * params.diffuse * (n.dot(directions.wi).max(0.0) / PI);
         if !self.is_specular() {
-            return finish.diffuse * (n.dot(way.wi).max(0.0) / PI);
+            return params.diffuse * (n.dot(directions.wi).max(0.0) / PI);
         }
-        let lobe = self.lobe.evaluate_widened(finish.gloss, n.dot(way.wh));
+        let lobe = self.lobe.evaluate_widened(params.roughness, n.dot(directions.wh));
         if lobe == 0.0 {
             return diffuse;
         }
-        diffuse + self.lobe.tint(way.u) * fresnel * (lobe * self.factor(n, way, finish.gloss))
+        diffuse
+            + self.lobe.tint(directions.u) * fresnel * (lobe * self.factor(n, directions, params.roughness))
     }
 }
 
@@ -192,26 +194,30 @@ mod tests {
     #[test]
     fn models_are_their_formulas() {
         let n = DVec3::new(0.1, -0.2, 0.9).normalize();
-        let way =
-            Way::new(DVec3::new(0.5, 0.1, 0.8).normalize(), DVec3::new(-0.3, 0.2, 0.7).normalize()).unwrap();
-        let finish =
-            Finish { diffuse: DVec3::splat(0.5), specular: DVec3::splat(0.04), gloss: SlopeVariance::ZERO };
+        let directions =
+            Directions::new(DVec3::new(0.5, 0.1, 0.8).normalize(), DVec3::new(-0.3, 0.2, 0.7).normalize())
+                .unwrap();
+        let params = SurfaceParams {
+            diffuse: DVec3::splat(0.5),
+            specular: DVec3::splat(0.04),
+            roughness: SlopeVariance::ZERO,
+        };
         let lobe = || brdf::parse("beckmann:0.3").unwrap();
-        let d = lobe().evaluate(n.dot(way.wh));
-        let f = 0.04 + 0.96 * (1.0 - way.u).powi(5);
-        let (i, o) = (n.dot(way.wi), n.dot(way.wo));
-        let of = |model| Reflection { lobe: lobe(), model }.facet(n, &finish, &way).x;
+        let d = lobe().evaluate(n.dot(directions.wh));
+        let f = 0.04 + 0.96 * (1.0 - directions.u).powi(5);
+        let (i, o) = (n.dot(directions.wi), n.dot(directions.wo));
+        let of = |shading| Brdf { lobe: lobe(), shading }.facet(n, &params, &directions).x;
         let tan = f * d / o + (1.0 - f) * 0.5 * i / PI;
         let han = (0.04 * d + 0.5 / PI) * i;
-        assert!((of(Model::Tan) - tan).abs() < 1e-14 && (of(Model::Han) - han).abs() < 1e-14);
+        assert!((of(ShadingModel::Tan) - tan).abs() < 1e-14 && (of(ShadingModel::Han) - han).abs() < 1e-14);
         // At alpha 0.3 neither direction is steep enough for Walter's form to leave 1, whose exact value it then is to 4e-4.
         let smith = f * d / (4.0 * o) + (1.0 - f) * 0.5 * i / PI;
-        assert!((of(Model::Smith) - smith).abs() < 1e-14);
+        assert!((of(ShadingModel::Smith) - smith).abs() < 1e-14);
     }
 
     #[test]
     fn nothing_is_reflected_below_the_horizon() {
-        assert!(Way::new(DVec3::new(0.8, 0.0, -0.6), DVec3::Z).is_none());
-        assert!(Way::new(DVec3::Z, DVec3::X).is_none());
+        assert!(Directions::new(DVec3::new(0.8, 0.0, -0.6), DVec3::Z).is_none());
+        assert!(Directions::new(DVec3::Z, DVec3::X).is_none());
     }
 }

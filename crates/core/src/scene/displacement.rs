@@ -18,7 +18,7 @@ use crate::surface::{Surface, SurfaceRow};
 
 /// Heights of a map, and how far they stand out.
 #[derive(Clone, Debug)]
-pub struct Relief {
+pub struct Displacement {
     /// Heights in texture widths, in the first channel.
     pub heights: Arc<Lookup>,
     /// World length of a texture width on the mesh, in the mean.
@@ -29,7 +29,7 @@ pub struct Relief {
     pub reach: f64,
 }
 
-impl Relief {
+impl Displacement {
     /// The heights of a surface that lies on a mesh at `width` a texture width, `scale` times as high as keeps their slopes.
     #[must_use]
     pub fn new(surface: &dyn Surface, width: f64, scale: f64) -> Self {
@@ -95,18 +95,18 @@ pub(super) fn texture_width<'a>(meshes: impl Iterator<Item = &'a Mesh>, aspect: 
 impl Mesh {
     /// The mesh in triangles small enough for a relief to be tessellated in, with how slopes lie on it at each vertex.
     #[must_use]
-    pub fn with_relief(&self, relief: &Relief) -> Self {
-        split(&Self { stretches: self.slope_maps(relief), ..self.clone() })
+    pub fn with_displacement(&self, displacement: &Displacement) -> Self {
+        split(&Self { stretches: self.slope_maps(displacement), ..self.clone() })
     }
 
     /// How slopes of the map lie on the surface, at each vertex: from the mean of the triangles around, by area.
-    fn slope_maps(&self, relief: &Relief) -> Vec<Mat2> {
+    fn slope_maps(&self, displacement: &Displacement) -> Vec<Mat2> {
         let mut sums = vec![(DMat2::ZERO, 0.0); self.vertices.len()];
         for t in &self.triangles {
             let [a, b, c] = t.map(|i| self.vertices[i as usize]);
             let (p, q) = (b.position - a.position, c.position - a.position);
             // In texture widths, y up.
-            let along = |d: glam::Vec2| DVec2::new(d.x.into(), -f64::from(d.y) * relief.aspect());
+            let along = |d: glam::Vec2| DVec2::new(d.x.into(), -f64::from(d.y) * displacement.aspect());
             let (m, n) = (along(b.uv - a.uv), along(c.uv - a.uv));
             let determinant = m.perp_dot(n);
             if determinant == 0.0 {
@@ -131,10 +131,10 @@ impl Mesh {
         let of = |(sum, weight): (DMat2, f64)| {
             let mean = sum * (1.0 / weight.max(f64::MIN_POSITIVE));
             // Where the map is crushed to a line, as at a pole, there is no telling: it lies evenly there.
-            if mean.determinant().abs() < 1e-6 * relief.width * relief.width {
-                return Mat2::IDENTITY * (relief.depth / relief.width) as f32;
+            if mean.determinant().abs() < 1e-6 * displacement.width * displacement.width {
+                return Mat2::IDENTITY * (displacement.depth / displacement.width) as f32;
             }
-            (mean.transpose().inverse() * relief.depth).as_mat2()
+            (mean.transpose().inverse() * displacement.depth).as_mat2()
         };
         sums.into_iter().map(of).collect()
     }

@@ -1,0 +1,65 @@
+//! The table of lobes, and how their spellings are read.
+
+use super::{Lobe, beckmann, blinn_phong, ggx, lambert, measured, torrance_sparrow};
+
+/// A row of [`TABLE`].
+pub struct Row {
+    /// The word before the colon.
+    pub name: &'static str,
+    /// What follows it, for help: `:S`, `:ALPHA` or nothing.
+    pub parameter: &'static str,
+    /// One line for help and docs.
+    pub summary: &'static str,
+    /// Reads the parameter.
+    pub parse: fn(&str) -> Result<Box<dyn Lobe>, String>,
+    /// Spellings that the conformance tests run.
+    pub samples: &'static [&'static str],
+}
+
+/// Every lobe there is.
+pub static TABLE: &[Row] = &[
+    lambert::ROW,
+    blinn_phong::ROW,
+    torrance_sparrow::ROW,
+    beckmann::ROW,
+    ggx::ROW,
+    measured::SGD,
+    measured::ABC,
+];
+
+/// A spelling that names no lobe.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ParseLobeError {
+    /// No row of the table has this name.
+    #[error("there is no BRDF called `{0}`")]
+    Unknown(String),
+    /// The parameter is missing, superfluous or out of range.
+    #[error("BRDF `{spelling}`: {reason}")]
+    Parameter {
+        /// What was written.
+        spelling: String,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+/// Reads a spelling such as `blinn-phong:50`, `ggx:0.2` or `lambert`.
+///
+/// # Errors
+/// [`ParseLobeError`], naming what is wrong.
+pub fn parse(spelling: &str) -> Result<Box<dyn Lobe>, ParseLobeError> {
+    let (name, parameter) = spelling.split_once(':').unwrap_or((spelling, ""));
+    let row =
+        TABLE.iter().find(|row| row.name == name).ok_or_else(|| ParseLobeError::Unknown(name.to_owned()))?;
+    (row.parse)(parameter)
+        .map_err(|reason| ParseLobeError::Parameter { spelling: spelling.to_owned(), reason })
+}
+
+/// Reads the one number of a lobe into its unit.
+pub(super) fn number<U, E: ToString>(text: &str, unit: fn(f64) -> Result<U, E>) -> Result<U, String> {
+    if text.is_empty() {
+        return Err("a number must follow, as in `name:0.5`".to_owned());
+    }
+    let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
+    unit(value).map_err(|e| e.to_string())
+}
