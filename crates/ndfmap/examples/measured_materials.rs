@@ -5,8 +5,8 @@
 use std::path::PathBuf;
 
 use ndfmap::core::bake::Bake;
-use ndfmap::core::measure::TexelTruth;
 use ndfmap::core::grid::Size;
+use ndfmap::core::measure::TexelTruth;
 use ndfmap::core::pyramid::Precision;
 use ndfmap::core::sphere::DiskLattice;
 use ndfmap::core::surface::{SlopeFilter, Wraps};

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{Bake, BakeReport, LevelSink, write_rows};
-use crate::fit::{Fit, FitJob, FittedRows, Four, fit_levels};
+use crate::fit::{Fit, FitJob, FittedRows, Rgba, fit_levels};
 use crate::grid::Grid;
 
 impl Bake<'_> {
@@ -11,16 +11,15 @@ impl Bake<'_> {
     pub(super) fn run_fitted<S: LevelSink>(
         &self,
         fit: &Fit,
-        attributes: &[Grid<Four>],
+        attributes: &[Grid<Rgba>],
         sink: &mut S,
     ) -> Result<BakeReport, S::Error> {
         let mut report = BakeReport::default();
         let job = FitJob { surface: self.surface, attributes, progress: self.progress };
         fit_levels(fit, &job, &mut |rows: &FittedRows<'_>| {
-            let store = |lobe: &Four| self.method.store_lobe(lobe);
-            let mut layers = self.layers_of(fit.lobes, rows.sums, store);
+            let mut layers = self.layers_of_lobes(fit.lobes, rows);
             for carried in rows.attributes {
-                layers.extend(self.layers_of(fit.lobes, carried, |value| *value));
+                layers.extend(self.layers_of_attribute(fit.lobes, carried));
             }
             report.overflowed += layers.iter().map(|l| l.1).sum::<usize>();
             let bytes: Vec<&[u8]> = layers.iter().map(|l| l.0.as_slice()).collect();
@@ -29,19 +28,36 @@ impl Bake<'_> {
         Ok(report)
     }
 
-    /// Bytes of each lobe's layer, and how many of its channels overflowed.
-    fn layers_of(
-        &self,
-        lobes: usize,
-        sums: &[Four],
-        store: impl Fn(&Four) -> Four + Sync,
-    ) -> Vec<(Vec<u8>, usize)> {
-        let layer = |j: usize| {
-            let values: Vec<f32> = sums.iter().skip(j).step_by(lobes).flat_map(&store).collect();
-            let mut bytes = Vec::new();
-            let overflowed = self.precision.pack(&values, &mut bytes);
-            (bytes, overflowed)
+    /// Bytes of the layers of each lobe, one lobe after another, and how many of their channels overflowed.
+    fn layers_of_lobes(&self, lobes: usize, rows: &FittedRows<'_>) -> Vec<(Vec<u8>, usize)> {
+        let each = rows.statistics.div_ceil(4);
+        let layer = |i: usize| {
+            let (lobe, part) = (i / each, i % each);
+            let mut channels = vec![1.0; 4 * each];
+            let texels = rows.sums.chunks_exact(rows.statistics).skip(lobe).step_by(lobes);
+            let values: Vec<f32> = texels
+                .flat_map(|sums| {
+                    self.method.store_lobe(sums, &mut channels);
+                    [0, 1, 2, 3].map(|c| channels[4 * part + c])
+                })
+                .collect();
+            self.packed(&values)
+        };
+        (0..lobes * each).into_par_iter().map(layer).collect()
+    }
+
+    /// Bytes of the layers of an attribute, one a lobe.
+    fn layers_of_attribute(&self, lobes: usize, carried: &[Rgba]) -> Vec<(Vec<u8>, usize)> {
+        let layer = |lobe: usize| {
+            let values: Vec<f32> = carried.iter().skip(lobe).step_by(lobes).flatten().copied().collect();
+            self.packed(&values)
         };
         (0..lobes).into_par_iter().map(layer).collect()
+    }
+
+    fn packed(&self, values: &[f32]) -> (Vec<u8>, usize) {
+        let mut bytes = Vec::new();
+        let overflowed = self.precision.pack(values, &mut bytes);
+        (bytes, overflowed)
     }
 }

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use self::average::{RowAverager, Sums, copy_row, halve};
 use self::plan::{BAND, Band, Plan, split_layers};
 
-use crate::fit::Four;
+use crate::fit::Rgba;
 use crate::grid::{Grid, Size};
 use crate::ndf::Method;
 use crate::pyramid::{Layout, LevelMismatch, Precision, Pyramid, footprint, level_sizes};
@@ -99,7 +99,7 @@ impl Bake<'_> {
 
     /// Bakes into memory with attributes; see [`Self::run_with`].
     #[must_use]
-    pub fn to_pyramid_with(&self, attributes: &[Grid<Four>]) -> (Pyramid, BakeReport) {
+    pub fn to_pyramid_with(&self, attributes: &[Grid<Rgba>]) -> (Pyramid, BakeReport) {
         let mut sink = MemorySink::new(self.layout_with(attributes.len()));
         let report = self.run_with(attributes, &mut sink).unwrap_or_else(|never| match never {});
         (sink.finish(), report)
@@ -123,7 +123,7 @@ impl Bake<'_> {
     /// When the method is not fitted and there are attributes, or an attribute has another size.
     pub fn run_with<S: LevelSink>(
         &self,
-        attributes: &[Grid<Four>],
+        attributes: &[Grid<Rgba>],
         sink: &mut S,
     ) -> Result<BakeReport, S::Error> {
         if let Some(fit) = self.method.fit() {

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use fearless_simd::{Level, dispatch};
 
-use super::family::Four;
+use super::family::log_density;
 use super::samples::Samples;
 
 /// Lobes a texel may have.
@@ -18,25 +18,29 @@ pub(crate) const LANES: usize = 16;
 const RUN: usize = 1024;
 
 /// Sets `sums` to the weighted sums of each lobe, sharing samples out in proportion to `exp(theta · (1, T))`.
-pub(crate) fn assign(theta: &[Four], samples: &Samples, sums: &mut [Four]) {
+pub(crate) fn assign<const N: usize>(theta: &[[f32; N]], samples: &Samples<N>, sums: &mut [[f32; N]]) {
     match theta.len() {
-        1 => assign_fixed::<1>(theta, samples, sums),
-        2 => assign_fixed::<2>(theta, samples, sums),
-        3 => assign_fixed::<3>(theta, samples, sums),
-        4 => assign_fixed::<4>(theta, samples, sums),
-        5 => assign_fixed::<5>(theta, samples, sums),
-        6 => assign_fixed::<6>(theta, samples, sums),
-        7 => assign_fixed::<7>(theta, samples, sums),
-        _ => assign_fixed::<MAX_LOBES>(theta, samples, sums),
+        1 => assign_fixed::<1, N>(theta, samples, sums),
+        2 => assign_fixed::<2, N>(theta, samples, sums),
+        3 => assign_fixed::<3, N>(theta, samples, sums),
+        4 => assign_fixed::<4, N>(theta, samples, sums),
+        5 => assign_fixed::<5, N>(theta, samples, sums),
+        6 => assign_fixed::<6, N>(theta, samples, sums),
+        7 => assign_fixed::<7, N>(theta, samples, sums),
+        _ => assign_fixed::<MAX_LOBES, N>(theta, samples, sums),
     }
 }
 
-fn assign_fixed<const J: usize>(theta: &[Four], samples: &Samples, sums: &mut [Four]) {
-    let theta: &[Four; J] = theta.first_chunk().expect("as many lobes as were matched");
-    let mut total = [[0.0_f64; 4]; J];
+fn assign_fixed<const J: usize, const N: usize>(
+    theta: &[[f32; N]],
+    samples: &Samples<N>,
+    sums: &mut [[f32; N]],
+) {
+    let theta: &[[f32; N]; J] = theta.first_chunk().expect("as many lobes as were matched");
+    let mut total = [[0.0_f64; N]; J];
     for start in (0..samples.len()).step_by(RUN) {
         let range = start..(start + RUN).min(samples.len());
-        let part = dispatch!(Level::new(), _simd => assign_run::<J>(theta, samples, range));
+        let part = dispatch!(Level::new(), _simd => assign_run::<J, N>(theta, samples, range));
         for (total, part) in total.iter_mut().flatten().zip(part.iter().flatten()) {
             *total += f64::from(*part);
         }
@@ -61,19 +65,25 @@ pub(crate) fn exp(x: f32) -> f32 {
 
 // Loops over lanes by number, one operation each: the form that becomes SIMD at every level, in the same order.
 #[inline(always)]
-fn assign_run<const J: usize>(theta: &[Four; J], samples: &Samples, range: Range<usize>) -> [Four; J] {
-    let mut sums = [[[0.0_f32; LANES]; 4]; J];
-    let a = samples.a[range.clone()].as_chunks::<LANES>().0;
-    let b = samples.b[range.clone()].as_chunks::<LANES>().0;
-    let c = samples.c[range.clone()].as_chunks::<LANES>().0;
-    let w = samples.weight[range].as_chunks::<LANES>().0;
-    for (((a, b), c), w) in a.iter().zip(b).zip(c).zip(w) {
+fn assign_run<const J: usize, const N: usize>(
+    theta: &[[f32; N]; J],
+    samples: &Samples<N>,
+    range: Range<usize>,
+) -> [[f32; N]; J] {
+    let mut sums = [[[0.0_f32; LANES]; N]; J];
+    let planes: [&[[f32; LANES]]; N] =
+        std::array::from_fn(|p| samples.planes[p][range.clone()].as_chunks::<LANES>().0);
+    for i in 0..planes[0].len() {
+        // The first plane is the weight, whose statistic is one.
+        let t: [&[f32; LANES]; N] = std::array::from_fn(|p| &planes[p][i]);
         let mut log = [[0.0_f32; LANES]; J];
         let mut most = [f32::MIN; LANES];
         for j in 0..J {
-            let [t0, t1, t2, t3] = theta[j];
-            for k in 0..LANES {
-                log[j][k] = t0 + t1 * a[k] + t2 * b[k] + t3 * c[k];
+            log[j] = [theta[j][0]; LANES];
+            for s in 1..N {
+                for k in 0..LANES {
+                    log[j][k] += theta[j][s] * t[s][k];
+                }
             }
             for k in 0..LANES {
                 most[k] = most[k].max(log[j][k]);
@@ -89,25 +99,25 @@ fn assign_run<const J: usize>(theta: &[Four; J], samples: &Samples, range: Range
             }
         }
         for k in 0..LANES {
-            share[k] = w[k] / share[k];
+            share[k] = t[0][k] / share[k];
         }
         for (log, sums) in log.iter().zip(&mut sums) {
             for k in 0..LANES {
                 let z = log[k] * share[k];
                 sums[0][k] += z;
-                sums[1][k] += z * a[k];
-                sums[2][k] += z * b[k];
-                sums[3][k] += z * c[k];
+                for s in 1..N {
+                    sums[s][k] += z * t[s][k];
+                }
             }
         }
     }
-    sums.map(|four| four.map(|lanes| lanes.iter().sum()))
+    sums.map(|statistics| statistics.map(|lanes| lanes.iter().sum()))
 }
 
 /// The shares of one sample, one a lobe, and the logarithm of its density.
-pub(crate) fn shares(theta: &[Four], t: [f32; 3], shares: &mut [f32]) -> f32 {
+pub(crate) fn shares<const N: usize>(theta: &[[f32; N]], t: &[f32; N], shares: &mut [f32]) -> f32 {
     for (share, theta) in shares.iter_mut().zip(theta) {
-        *share = theta[0] + theta[1] * t[0] + theta[2] * t[1] + theta[3] * t[2];
+        *share = log_density(theta, t);
     }
     let most = shares.iter().copied().fold(f32::MIN, f32::max);
     shares.iter_mut().for_each(|s| *s = (*s - most).exp());
@@ -137,7 +147,7 @@ mod tests {
         let mut samples = Samples::default();
         for i in 0..2500 {
             let x = (i as f32 * 0.37).sin();
-            samples.push(1.0 / 2500.0, [x, 0.5 * x * x - 0.2, (i as f32 * 0.11).cos()]);
+            samples.push(1.0 / 2500.0, [1.0, x, 0.5 * x * x - 0.2, (i as f32 * 0.11).cos()]);
         }
         samples.pad();
         let mut sums = [[0.0; 4]; 3];
@@ -145,11 +155,11 @@ mod tests {
         let mut expected = [[0.0_f64; 4]; 3];
         let mut z = [0.0; 3];
         for i in 0..2500 {
-            let t = [samples.a[i], samples.b[i], samples.c[i]];
-            shares(&theta, t, &mut z);
+            let t = samples.statistics(i);
+            shares(&theta, &t, &mut z);
             for j in 0..3 {
-                let w = f64::from(samples.weight[i] * z[j]);
-                for (sum, value) in expected[j].iter_mut().zip([1.0, t[0], t[1], t[2]]) {
+                let w = f64::from(samples.weights()[i] * z[j]);
+                for (sum, value) in expected[j].iter_mut().zip(t) {
                     *sum += w * f64::from(value);
                 }
             }

@@ -7,38 +7,53 @@
 use rayon::prelude::*;
 
 use super::assign::{MAX_LOBES, assign};
-use super::em::naturals;
-use super::family::{Family, Four, Pull};
+use super::em::{iterate, naturals};
+use super::family::{Family, Isotropic, Pull};
 use super::samples::{SampleGrid, Samples};
-use super::{Fitter, LEAST_WEIGHT, Level, PARENT_ROUNDS, at};
+use super::{LEAST_WEIGHT, Level, PARENT_ROUNDS, at, each_texel};
 use crate::surface::Wraps;
 
 /// Strength of the prior: `c` of Tan et al. and `C` of Han et al., 1 in both.
 const STRENGTH: f32 = 1.0;
+
+/// What the prior of a level looks at, besides the level itself.
+pub(crate) struct PriorContext<'a, const N: usize> {
+    pub(super) grid: &'a SampleGrid<N>,
+    pub(super) parent: &'a Level<N>,
+    pub(super) lobes: usize,
+    pub(super) wraps: Wraps,
+    /// Texels of the finest level.
+    pub(super) finest: usize,
+}
 
 /// Which of the four passes visits a texel.
 fn pass_of((x, y): (usize, usize)) -> usize {
     (x & 1) + 2 * (y & 1)
 }
 
-/// EM with the prior for every texel of a level, from the sums that are in it.
-pub(super) fn with_prior<F: Family>(
-    fitter: &Fitter<'_, F>,
-    grid: &SampleGrid,
-    parent: &Level,
-    level: &mut Level,
+/// Plain EM for every texel of a level, from the sums that are in it.
+pub(super) fn without_prior<const N: usize>(
+    family: impl Family<N>,
+    context: &PriorContext<'_, N>,
+    level: &mut Level<N>,
 ) {
-    let (family, lobes, size) = (fitter.family, fitter.fit.lobes, level.size);
-    let wraps: Wraps = fitter.job.surface.wraps();
-    let fine = fitter.sizes[0];
-    let count = fine.area() as f32 / size.area() as f32;
+    each_texel(context.grid, level, context.lobes, |_, samples, sums| {
+        iterate(family, samples, PARENT_ROUNDS, sums);
+    });
+}
+
+/// EM with the prior for every texel of a level, from the sums that are in it.
+pub(super) fn with_prior(family: impl Isotropic, context: &PriorContext<'_, 4>, level: &mut Level<4>) {
+    let PriorContext { grid, parent, lobes, wraps, finest } = *context;
+    let size = level.size;
+    let count = finest as f32 / size.area() as f32;
     for pass in 0..4 {
         let sums = &level.sums;
         let texels: Vec<usize> = (0..size.area()).filter(|i| pass_of(at(size, *i)) == pass).collect();
-        let fit = |samples: &mut Samples, i: &usize| {
+        let fit = |samples: &mut Samples<4>, i: &usize| {
             let (x, y) = at(size, *i);
             let mut pulls = [Pull { strength: STRENGTH, count, ..Pull::default() }; MAX_LOBES];
-            let mut draw = |neighbour: &[Four]| {
+            let mut draw = |neighbour: &[[f32; 4]]| {
                 for (pull, sums) in pulls.iter_mut().zip(neighbour).filter(|(_, s)| s[0] > LEAST_WEIGHT) {
                     let shape = family.decode(sums);
                     pull.weight += shape.alpha;
@@ -62,11 +77,12 @@ pub(super) fn with_prior<F: Family>(
                 naturals(family, &own[..lobes], &mut theta[..lobes]);
                 assign(&theta[..lobes], samples, &mut own[..lobes]);
             }
-            let settle =
-                |(own, pull): (&Four, &Pull)| family.settle(&family.decode(&family.with_prior(own, pull)));
+            let settle = |(own, pull): (&[f32; 4], &Pull)| {
+                family.settle(&family.decode(&family.with_prior(own, pull)))
+            };
             std::array::from_fn(|j| settle((&own[j], &pulls[j])))
         };
-        let fitted: Vec<[Four; MAX_LOBES]> = texels.par_iter().map_init(Samples::default, fit).collect();
+        let fitted: Vec<[[f32; 4]; MAX_LOBES]> = texels.par_iter().map_init(Samples::default, fit).collect();
         for (i, own) in texels.iter().zip(fitted) {
             level.sums[i * lobes..][..lobes].copy_from_slice(&own[..lobes]);
         }

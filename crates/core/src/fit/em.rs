@@ -4,12 +4,17 @@ use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 
 use super::assign::{MAX_LOBES, assign, shares};
-use super::family::{Family, Four};
+use super::family::Family;
 use super::samples::Samples;
 
 /// Rounds of EM from these sums, which end as those of the last M-step.
-pub(crate) fn iterate(family: impl Family, samples: &Samples, rounds: usize, sums: &mut [Four]) {
-    let mut theta = [[0.0; 4]; MAX_LOBES];
+pub(crate) fn iterate<const N: usize>(
+    family: impl Family<N>,
+    samples: &Samples<N>,
+    rounds: usize,
+    sums: &mut [[f32; N]],
+) {
+    let mut theta = [[0.0; N]; MAX_LOBES];
     let theta = &mut theta[..sums.len()];
     for _ in 0..rounds {
         naturals(family, sums, theta);
@@ -18,52 +23,55 @@ pub(crate) fn iterate(family: impl Family, samples: &Samples, rounds: usize, sum
 }
 
 /// `theta` of every lobe.
-pub(crate) fn naturals(family: impl Family, sums: &[Four], theta: &mut [Four]) {
+pub(crate) fn naturals<const N: usize>(family: impl Family<N>, sums: &[[f32; N]], theta: &mut [[f32; N]]) {
     for (theta, sums) in theta.iter_mut().zip(sums) {
         *theta = family.natural(sums);
     }
 }
 
 /// Mean log-likelihood of the samples under a mixture.
-pub(crate) fn log_likelihood(family: impl Family, samples: &Samples, sums: &[Four]) -> f64 {
-    let mut theta = [[0.0; 4]; MAX_LOBES];
+pub(crate) fn log_likelihood<const N: usize>(
+    family: impl Family<N>,
+    samples: &Samples<N>,
+    sums: &[[f32; N]],
+) -> f64 {
+    let mut theta = [[0.0; N]; MAX_LOBES];
     let theta = &mut theta[..sums.len()];
     naturals(family, sums, theta);
     let mut z = [0.0; MAX_LOBES];
-    let log = |i: usize| shares(theta, [samples.a[i], samples.b[i], samples.c[i]], &mut z[..sums.len()]);
+    let log = |i: usize| shares(theta, &samples.statistics(i), &mut z[..sums.len()]);
     let logs = (0..samples.len()).map(log).collect::<Vec<f32>>();
-    logs.iter().zip(&samples.weight).map(|(log, w)| f64::from(*log) * f64::from(*w)).sum()
+    logs.iter().zip(samples.weights()).map(|(log, w)| f64::from(*log) * f64::from(*w)).sum()
 }
 
 /// A lobe this steep gives every sample to the nearest mean.
 const STEEP: f32 = 2e4;
 
 /// Sets `sums` to those of the samples nearest to each seed.
-fn assign_to_nearest(seeds: &[[f32; 3]], samples: &Samples, sums: &mut [Four]) {
-    let mut theta = [[0.0; 4]; MAX_LOBES];
+fn assign_to_nearest<const N: usize>(seeds: &[[f32; N]], samples: &Samples<N>, sums: &mut [[f32; N]]) {
+    let mut theta = [[0.0; N]; MAX_LOBES];
     for (theta, seed) in theta.iter_mut().zip(seeds) {
-        let square = distance(*seed, [0.0; 3]);
-        *theta = [-0.5 * square * STEEP, seed[0] * STEEP, seed[1] * STEEP, seed[2] * STEEP];
+        *theta = seed.map(|t| t * STEEP);
+        theta[0] = -0.5 * distance(seed, &[0.0; N]) * STEEP;
     }
     assign(&theta[..seeds.len()], samples, sums);
 }
 
-fn distance(p: [f32; 3], q: [f32; 3]) -> f32 {
-    (0..3).map(|k| (p[k] - q[k]).powi(2)).sum()
+/// Squared distance of two vectors of statistics; the first statistic, which is one, is no coordinate.
+fn distance<const N: usize>(p: &[f32; N], q: &[f32; N]) -> f32 {
+    (1..N).map(|k| (p[k] - q[k]).powi(2)).sum()
 }
 
 /// Picks seeds among the points one after another, the first the heaviest point; `next` picks from the points' squared
 /// distances to the seeds so far, negative where there is no point.
-fn pick(points: &Samples, seeds: &mut [[f32; 3]], mut next: impl FnMut(&[f32]) -> usize) {
-    let at = |i: usize| [points.a[i], points.b[i], points.c[i]];
-    let mut nearest: Vec<f32> =
-        points.weight.iter().map(|w| if *w > 0.0 { f32::MAX } else { -1.0 }).collect();
-    let mut chosen =
-        (0..points.len()).fold(0, |h, i| if points.weight[i] > points.weight[h] { i } else { h });
+fn pick<const N: usize>(points: &Samples<N>, seeds: &mut [[f32; N]], mut next: impl FnMut(&[f32]) -> usize) {
+    let weight = points.weights();
+    let mut nearest: Vec<f32> = weight.iter().map(|w| if *w > 0.0 { f32::MAX } else { -1.0 }).collect();
+    let mut chosen = (0..points.len()).fold(0, |h, i| if weight[i] > weight[h] { i } else { h });
     for seed in seeds.iter_mut() {
-        *seed = at(chosen);
+        *seed = points.statistics(chosen);
         for (i, nearest) in nearest.iter_mut().enumerate() {
-            *nearest = nearest.min(distance(at(i), *seed));
+            *nearest = nearest.min(distance(&points.statistics(i), seed));
         }
         chosen = next(&nearest);
     }
@@ -71,8 +79,12 @@ fn pick(points: &Samples, seeds: &mut [[f32; 3]], mut next: impl FnMut(&[f32]) -
 
 /// Seeds each furthest from all before it (Hochbaum and Shmoys 1985, as in Han et al. 2007, section 6.2), and `sums`
 /// of the samples nearest to each.
-pub(crate) fn start_from_furthest(points: &Samples, samples: &Samples, sums: &mut [Four]) {
-    let mut seeds = [[0.0; 3]; MAX_LOBES];
+pub(crate) fn start_from_furthest<const N: usize>(
+    points: &Samples<N>,
+    samples: &Samples<N>,
+    sums: &mut [[f32; N]],
+) {
+    let mut seeds = [[0.0; N]; MAX_LOBES];
     let seeds = &mut seeds[..sums.len()];
     pick(points, seeds, |nearest| {
         (0..nearest.len()).fold(0, |f, i| if nearest[i] > nearest[f] { i } else { f })
@@ -81,11 +93,15 @@ pub(crate) fn start_from_furthest(points: &Samples, samples: &Samples, sums: &mu
 }
 
 /// Seeds drawn in proportion to weight times squared distance (Arthur and Vassilvitskii 2007, k-means++).
-pub(crate) fn start_at_random(samples: &Samples, random: &mut Pcg64Mcg, sums: &mut [Four]) {
-    let mut seeds = [[0.0; 3]; MAX_LOBES];
+pub(crate) fn start_at_random<const N: usize>(
+    samples: &Samples<N>,
+    random: &mut Pcg64Mcg,
+    sums: &mut [[f32; N]],
+) {
+    let mut seeds = [[0.0; N]; MAX_LOBES];
     let seeds = &mut seeds[..sums.len()];
     pick(samples, seeds, |nearest| {
-        let chance = |i: usize| f64::from(nearest[i].max(0.0) * samples.weight[i]);
+        let chance = |i: usize| f64::from(nearest[i].max(0.0) * samples.weights()[i]);
         let total: f64 = (0..nearest.len()).map(chance).sum();
         let mut left = total * random.random::<f64>();
         let drawn = (0..nearest.len()).find(|i| {
@@ -100,7 +116,7 @@ pub(crate) fn start_at_random(samples: &Samples, random: &mut Pcg64Mcg, sums: &m
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::family::{Planar, Spherical};
+    use crate::fit::family::{Isotropic, Planar, Spherical};
     use glam::{DVec3, Vec3};
     use rand::SeedableRng;
 
@@ -123,7 +139,7 @@ mod tests {
         (s * phi.cos() * a + s * phi.sin() * b + u * *mu).as_vec3()
     }
 
-    fn samples(family: impl Family, normals: &[Vec3]) -> Samples {
+    fn samples(family: impl Family<4>, normals: &[Vec3]) -> Samples<4> {
         let mut samples = Samples::default();
         normals.iter().for_each(|n| samples.push(1.0 / normals.len() as f32, family.statistics(*n)));
         samples.pad();
@@ -174,7 +190,7 @@ mod tests {
             let (u, v): (f64, f64) = (random.random(), random.random());
             let (r, phi) = (sigma * (-2.0 * (1.0 - u).ln()).sqrt(), std::f64::consts::TAU * v);
             let (x, y) = ((mu[0] + r * phi.cos()) as f32, (mu[1] + r * phi.sin()) as f32);
-            samples.push(1.0 / count as f32, [x, y, x * x + y * y]);
+            samples.push(1.0 / count as f32, [1.0, x, y, x * x + y * y]);
         }
         samples.pad();
         let mut sums = [[0.0; 4]; 2];

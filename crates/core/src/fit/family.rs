@@ -1,15 +1,15 @@
-//! The two kinds of lobe that are fitted, as exponential families with four sufficient statistics.
+//! Kinds of lobe that are fitted, as exponential families of any number of sufficient statistics.
 //!
-//! A lobe's *sums* are the weighted means of `(1, T(n))` over the normals it answers for. They mix by plain
-//! averaging and are all that an M-step needs, which is why a texel stores them. An E-step needs
-//! `log(alpha g(n))`, for both families a linear function of the same statistics, `theta · (1, T(n))`: four
-//! multiplications and an exponential a lobe, whatever the family.
+//! A lobe's *sums* are the weighted means of the statistics `(1, T(n))` over the normals it answers for. They mix by plain
+//! averaging and are all that an M-step needs, which is why a texel stores them. An E-step needs `log(alpha g(n))`, for
+//! every family a linear function of the same statistics, `theta · (1, T(n))`: N multiplications and an exponential a lobe.
 
 use glam::Vec3;
 
-/// Weight, then three statistics times the weight; or the natural parameters that go with them; or a
-/// derivative by the sums.
-pub type Four = [f32; 4];
+use super::Level;
+use super::coherent::PriorContext;
+use super::refine::LevelLobes;
+use super::samples::SampleGrid;
 
 /// Weight below which a lobe is dead: nothing is divided by it.
 pub(crate) const DEAD: f32 = 1e-7;
@@ -23,7 +23,7 @@ pub(crate) const LEAST_VARIANCE: f32 = 5e-6;
 pub(crate) const MOST_VARIANCE: f32 = 0.6;
 
 /// `theta` of a lobe that no normal should choose.
-const NOWHERE: Four = [-60.0, 0.0, 0.0, 0.0];
+const NOWHERE: f32 = -60.0;
 
 /// A decoded lobe.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -50,57 +50,116 @@ pub(crate) struct ShapeSlope {
     pub(crate) variance: f32,
 }
 
-/// A kind of lobe.
-pub(crate) trait Family: Copy + Send + Sync {
+/// `theta · (1, T)`, the logarithm of a weighted lobe's density.
+#[inline(always)]
+pub(crate) fn log_density<const N: usize>(theta: &[f32; N], t: &[f32; N]) -> f32 {
+    let mut log = theta[0];
+    for s in 1..N {
+        log += theta[s] * t[s];
+    }
+    log
+}
+
+/// Exponential family of lobes with N statistics, the first of them one.
+///
+/// Sums are the weight, then N - 1 statistics times the weight. [`Isotropic`] makes one of four of whatever has a mean and one
+/// variance.
+pub(crate) trait Family<const N: usize>: Copy + Send + Sync {
+    /// `(1, T(n))`.
+    fn statistics(self, n: Vec3) -> [f32; N];
+
+    /// `theta` of the weighted lobe with these sums.
+    fn natural(self, sums: &[f32; N]) -> [f32; N];
+
+    /// Mean of the lobe with these sums, in the space in which lobes of neighbours are matched.
+    fn mean(self, sums: &[f32; N]) -> [f32; 3];
+
+    /// Variance of the lobe with these sums, on one axis.
+    fn width(self, sums: &[f32; N]) -> f32;
+
+    /// Moves the lobes of a level towards the least error that is seen; nothing, for a family that knows no way.
+    fn refine(self, _grid: &SampleGrid<N>, _level: &mut LevelLobes<'_, N>, _rounds: usize) {}
+
+    /// EM with the papers' prior for the texels of a level; plain EM, for a family that has no prior.
+    fn fit_with_prior(self, context: &PriorContext<'_, N>, level: &mut Level<N>) {
+        super::coherent::without_prior(self, context, level);
+    }
+}
+
+/// Lobe around a mean with one variance on every axis: four statistics.
+pub(crate) trait Isotropic: Copy + Send + Sync {
     /// `T(n)`.
-    fn statistics(self, n: Vec3) -> [f32; 3];
+    fn sufficient(self, n: Vec3) -> [f32; 3];
 
     /// A lobe of this weight, with its mean and variance brought into their ranges.
     fn shape(self, alpha: f32, mean: [f32; 3], variance: f32) -> Shape;
 
-    /// What sums decode to; finite whatever they are.
-    fn decode(self, sums: &Four) -> Shape;
+    /// Shape that sums stand for; finite whatever they are.
+    fn decode(self, sums: &[f32; 4]) -> Shape;
 
     /// The sums of a lobe.
-    fn encode(self, shape: &Shape) -> Four;
+    fn encode(self, shape: &Shape) -> [f32; 4];
 
     /// `theta` of a unit lobe around `mean` with this variance.
-    fn unit_natural(self, mean: &[f32; 3], variance: f32) -> Four;
+    fn unit_natural(self, mean: &[f32; 3], variance: f32) -> [f32; 4];
 
     /// The unweighted mean of `n` in sums, as [`Shape::mean`] counts it: `Σ w n`.
-    fn first_moment(self, sums: &Four) -> [f32; 3];
+    fn first_moment(self, sums: &[f32; 4]) -> [f32; 3];
 
     /// `Σ w (half the squared distance of n to mean)` from sums.
-    fn spread(self, sums: &Four, mean: &[f32; 3]) -> f32;
+    fn spread(self, sums: &[f32; 4], mean: &[f32; 3]) -> f32;
 
     /// A derivative by the lobe's parameters as one by its sums.
-    fn slope_of_sums(self, shape: &Shape, slope: &ShapeSlope) -> Four;
+    fn slope_of_sums(self, shape: &Shape, slope: &ShapeSlope) -> [f32; 4];
 
     /// A derivative by sums as one by the lobe's own `(ln alpha, mean, variance)`.
-    fn slope_of_shape(self, shape: &Shape, slope: &Four) -> ShapeSlope;
+    fn slope_of_shape(self, shape: &Shape, slope: &[f32; 4]) -> ShapeSlope;
 
     /// The mean of the paper's prior: this lobe drawn towards `Σ alpha_k mu_k` of its neighbours, of total weight
     /// `weight`, by `strength`; `count` is the number of normals under the texel.
-    fn with_prior(self, sums: &Four, pull: &Pull) -> Four;
+    fn with_prior(self, sums: &[f32; 4], pull: &Pull) -> [f32; 4];
 
-    /// The sums of a lobe that is to be stored: one that ended at the least variance has none that can be told.
-    fn settle(self, shape: &Shape) -> Four {
+    /// Sums of a shape as they are stored: a lobe that ended at the least variance has none that can be told.
+    fn settle(self, shape: &Shape) -> [f32; 4] {
         // Through single-precision sums it comes back with an error of about 1 %.
         if shape.variance > 1.05 * LEAST_VARIANCE {
             return self.encode(shape);
         }
         self.encode(&Shape { variance: 0.0, length: 1.0, ..*shape })
     }
+}
 
-    /// `theta` of a weighted lobe with these sums.
-    fn natural(self, sums: &Four) -> Four {
+impl<F: Isotropic> Family<4> for F {
+    #[inline(always)]
+    fn statistics(self, n: Vec3) -> [f32; 4] {
+        let [a, b, c] = self.sufficient(n);
+        [1.0, a, b, c]
+    }
+
+    fn natural(self, sums: &[f32; 4]) -> [f32; 4] {
         if sums[0] <= DEAD {
-            return NOWHERE;
+            return [NOWHERE, 0.0, 0.0, 0.0];
         }
         let shape = self.decode(sums);
         let mut theta = self.unit_natural(&shape.mean, shape.variance);
         theta[0] += shape.alpha.ln();
         theta
+    }
+
+    fn mean(self, sums: &[f32; 4]) -> [f32; 3] {
+        self.decode(sums).mean
+    }
+
+    fn width(self, sums: &[f32; 4]) -> f32 {
+        self.decode(sums).variance
+    }
+
+    fn refine(self, grid: &SampleGrid<4>, level: &mut LevelLobes<'_, 4>, rounds: usize) {
+        super::refine::refine(self, grid, level, rounds);
+    }
+
+    fn fit_with_prior(self, context: &PriorContext<'_, 4>, level: &mut Level<4>) {
+        super::coherent::with_prior(self, context, level);
     }
 }
 
@@ -159,9 +218,9 @@ pub(crate) fn from_pole(m: &[f32; 3]) -> f32 {
     if m[2] > 0.0 { (m[0] * m[0] + m[1] * m[1]) / (1.0 + m[2]) } else { 1.0 - m[2] }
 }
 
-impl Family for Spherical {
+impl Isotropic for Spherical {
     #[inline(always)]
-    fn statistics(self, n: Vec3) -> [f32; 3] {
+    fn sufficient(self, n: Vec3) -> [f32; 3] {
         [n.x, n.y, from_pole(&n.to_array())]
     }
 
@@ -170,7 +229,7 @@ impl Family for Spherical {
         Shape { alpha, mean: unit_or_up(mean), variance, length: length_of_variance(variance) }
     }
 
-    fn decode(self, &[alpha, x, y, w]: &Four) -> Shape {
+    fn decode(self, &[alpha, x, y, w]: &[f32; 4]) -> Shape {
         if alpha <= DEAD {
             return self.shape(0.0, [0.0, 0.0, 1.0], LEAST_VARIANCE);
         }
@@ -185,7 +244,7 @@ impl Family for Spherical {
         self.shape(alpha, [x, y, 1.0 - w], variance)
     }
 
-    fn encode(self, s: &Shape) -> Four {
+    fn encode(self, s: &Shape) -> [f32; 4] {
         let r = s.length;
         [
             s.alpha,
@@ -195,7 +254,7 @@ impl Family for Spherical {
         ]
     }
 
-    fn unit_natural(self, m: &[f32; 3], variance: f32) -> Four {
+    fn unit_natural(self, m: &[f32; 3], variance: f32) -> [f32; 4] {
         // kappa/(2 pi (1 - e^{-2 kappa})) e^{kappa (n·mu - 1)}; the second factor is 1 in single floats above 10.
         let kappa = variance.recip();
         let scale =
@@ -203,15 +262,15 @@ impl Family for Spherical {
         [scale.ln() - kappa * from_pole(m), kappa * m[0], kappa * m[1], -kappa * m[2]]
     }
 
-    fn first_moment(self, s: &Four) -> [f32; 3] {
+    fn first_moment(self, s: &[f32; 4]) -> [f32; 3] {
         [s[1], s[2], s[0] - s[3]]
     }
 
-    fn spread(self, s: &Four, mean: &[f32; 3]) -> f32 {
+    fn spread(self, s: &[f32; 4], mean: &[f32; 3]) -> f32 {
         s[0] - dot(&self.first_moment(s), mean)
     }
 
-    fn slope_of_sums(self, s: &Shape, slope: &ShapeSlope) -> Four {
+    fn slope_of_sums(self, s: &Shape, slope: &ShapeSlope) -> [f32; 4] {
         // r = X/alpha, mean = r/|r|, variance a function of |r|.
         let r = s.length;
         let along = dot(&slope.mean, &s.mean);
@@ -223,7 +282,7 @@ impl Family for Spherical {
         [alpha + x[2], x[0], x[1], -x[2]]
     }
 
-    fn slope_of_shape(self, s: &Shape, slope: &Four) -> ShapeSlope {
+    fn slope_of_shape(self, s: &Shape, slope: &[f32; 4]) -> ShapeSlope {
         let r = s.length;
         let x = [slope[1], slope[2], -slope[3]];
         let along = dot(&x, &s.mean);
@@ -236,7 +295,7 @@ impl Family for Spherical {
     }
 
     /// `mu_j = normalize(r_j + C Σ alpha_jk mu_jk)`, the length of `r_j` kept (Han et al. 2007, section 6.3).
-    fn with_prior(self, sums: &Four, pull: &Pull) -> Four {
+    fn with_prior(self, sums: &[f32; 4], pull: &Pull) -> [f32; 4] {
         let shape = self.decode(sums);
         if shape.alpha <= DEAD {
             return *sums;
@@ -250,9 +309,9 @@ impl Family for Spherical {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Planar;
 
-impl Family for Planar {
+impl Isotropic for Planar {
     #[inline(always)]
-    fn statistics(self, n: Vec3) -> [f32; 3] {
+    fn sufficient(self, n: Vec3) -> [f32; 3] {
         [n.x, n.y, n.x * n.x + n.y * n.y]
     }
 
@@ -262,7 +321,7 @@ impl Family for Planar {
         Shape { alpha, mean, variance: variance.clamp(LEAST_VARIANCE, MOST_VARIANCE), length: 1.0 }
     }
 
-    fn decode(self, &[alpha, x, y, q]: &Four) -> Shape {
+    fn decode(self, &[alpha, x, y, q]: &[f32; 4]) -> Shape {
         if alpha <= DEAD {
             return self.shape(0.0, [0.0; 3], LEAST_VARIANCE);
         }
@@ -270,27 +329,27 @@ impl Family for Planar {
         self.shape(alpha, [x, y, 0.0], (q / alpha - x * x - y * y) * 0.5)
     }
 
-    fn encode(self, s: &Shape) -> Four {
+    fn encode(self, s: &Shape) -> [f32; 4] {
         let [x, y, _] = s.mean;
         [s.alpha, s.alpha * x, s.alpha * y, s.alpha * (2.0 * s.variance + x * x + y * y)]
     }
 
-    fn unit_natural(self, m: &[f32; 3], variance: f32) -> Four {
+    fn unit_natural(self, m: &[f32; 3], variance: f32) -> [f32; 4] {
         let precision = variance.recip();
         let norm = (precision / std::f32::consts::TAU).ln();
         let square = m[0] * m[0] + m[1] * m[1];
         [norm - 0.5 * square * precision, m[0] * precision, m[1] * precision, -0.5 * precision]
     }
 
-    fn first_moment(self, s: &Four) -> [f32; 3] {
+    fn first_moment(self, s: &[f32; 4]) -> [f32; 3] {
         [s[1], s[2], 0.0]
     }
 
-    fn spread(self, s: &Four, m: &[f32; 3]) -> f32 {
+    fn spread(self, s: &[f32; 4], m: &[f32; 3]) -> f32 {
         0.5 * (s[3] - 2.0 * dot(&self.first_moment(s), m) + s[0] * dot(m, m))
     }
 
-    fn slope_of_sums(self, s: &Shape, slope: &ShapeSlope) -> Four {
+    fn slope_of_sums(self, s: &Shape, slope: &ShapeSlope) -> [f32; 4] {
         // mean = X/alpha, variance = (q/alpha - |mean|²)/2.
         let q = slope.variance / (2.0 * s.alpha);
         let [x, y] = [0, 1].map(|k| (slope.mean[k] - slope.variance * s.mean[k]) / s.alpha);
@@ -298,7 +357,7 @@ impl Family for Planar {
         [slope.alpha - s.mean[0] * x - s.mean[1] * y - second * q, x, y, q]
     }
 
-    fn slope_of_shape(self, s: &Shape, slope: &Four) -> ShapeSlope {
+    fn slope_of_shape(self, s: &Shape, slope: &[f32; 4]) -> ShapeSlope {
         let sums = self.encode(s);
         let mean = |k: usize| s.alpha * (slope[k + 1] + 2.0 * s.mean[k] * slope[3]);
         ShapeSlope {
@@ -310,7 +369,7 @@ impl Family for Planar {
 
     /// `mu_i = (Σ z n + c Σ alpha_k mu_k)/(Σ z + c Σ alpha_k)`, `Σ z` a number of normals (Tan et al. 2005,
     /// section 4.2), and the variance about that mean.
-    fn with_prior(self, sums: &Four, pull: &Pull) -> Four {
+    fn with_prior(self, sums: &[f32; 4], pull: &Pull) -> [f32; 4] {
         let [alpha, x, y, q] = *sums;
         if alpha <= DEAD {
             return *sums;
@@ -327,7 +386,7 @@ impl Family for Planar {
 mod tests {
     use super::*;
 
-    fn shapes(family: impl Family) -> [Shape; 3] {
+    fn shapes(family: impl Isotropic) -> [Shape; 3] {
         [
             family.shape(0.3, unit_or_up([0.4, -0.3, 0.8]), 0.05),
             family.shape(1.0, unit_or_up([0.01, 0.0, 1.0]), 0.002),
@@ -335,7 +394,7 @@ mod tests {
         ]
     }
 
-    fn round_trip(family: impl Family, shape: &Shape) {
+    fn round_trip(family: impl Isotropic, shape: &Shape) {
         let back = family.decode(&family.encode(shape));
         // Single floats: 1 - |r|² holds about seven digits of 1.
         assert!((back.variance - shape.variance).abs() < 1e-6 + 1e-5 * shape.variance, "{back:?} {shape:?}");
@@ -343,7 +402,7 @@ mod tests {
     }
 
     /// `slope_of_sums` and `slope_of_shape` against finite differences of a smooth function of the sums.
-    fn slopes(family: impl Family, shape: &Shape) {
+    fn slopes(family: impl Isotropic, shape: &Shape) {
         let f = |s: &Shape| {
             f64::from(s.alpha).powi(2)
                 + f64::from(s.mean[0]) * 0.7
@@ -391,7 +450,7 @@ mod tests {
     fn theta_is_the_logarithm_of_the_density() {
         let shape = shapes(Spherical)[0];
         let n = Vec3::new(0.1, 0.2, 0.5).normalize();
-        let log = |theta: Four, t: [f32; 3]| theta[0] + theta[1] * t[0] + theta[2] * t[1] + theta[3] * t[2];
+        let log = |theta: [f32; 4], t: [f32; 4]| log_density(&theta, &t);
         let kappa = 1.0 / f64::from(shape.variance);
         let u = f64::from(dot(&n.to_array(), &shape.mean));
         let expected = (0.3 * kappa / (4.0 * std::f64::consts::PI * kappa.sinh())).ln() + kappa * u;

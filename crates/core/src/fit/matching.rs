@@ -4,20 +4,27 @@
 //! a subset to the parent's first lobes, one after another.
 
 use super::assign::MAX_LOBES;
-use super::family::{Family, Four, gap};
+use super::family::Family;
 
 /// Reorders a texel's lobes to lie closest to its parent's, by weight times squared distance of means.
-pub(crate) fn match_lobes(family: impl Family, parent: &[Four], sums: &mut [Four]) {
+pub(crate) fn match_lobes<const N: usize>(
+    family: impl Family<N>,
+    parent: &[[f32; N]],
+    sums: &mut [[f32; N]],
+) {
     let n = sums.len();
-    let shape = |sums: &[Four]| {
-        let mut shapes = [Default::default(); MAX_LOBES];
-        for (shape, sums) in shapes.iter_mut().zip(sums) {
-            *shape = family.decode(sums);
+    let means = |sums: &[[f32; N]]| {
+        let mut means = [[0.0; 3]; MAX_LOBES];
+        for (mean, sums) in means.iter_mut().zip(sums) {
+            *mean = family.mean(sums);
         }
-        shapes
+        means
     };
-    let (own, parent) = (shape(sums), shape(parent));
-    let cost = |i: usize, place: usize| own[i].alpha * gap(&own[i], &parent[place]);
+    let (own, parent) = (means(sums), means(parent));
+    let weights: [f32; MAX_LOBES] = std::array::from_fn(|i| sums.get(i).map_or(0.0, |s| s[0].max(0.0)));
+    let gap =
+        |i: usize, place: usize| 0.5 * (0..3).map(|k| (own[i][k] - parent[place][k]).powi(2)).sum::<f32>();
+    let cost = |i: usize, place: usize| weights[i] * gap(i, place);
     // best[set] is the least cost of giving the lobes in `set` to the parent's first |set|; last[set] the lobe given last.
     let mut best = [f32::INFINITY; 1 << MAX_LOBES];
     let mut last = [0; 1 << MAX_LOBES];
@@ -32,7 +39,7 @@ pub(crate) fn match_lobes(family: impl Family, parent: &[Four], sums: &mut [Four
             }
         }
     }
-    let before: [Four; MAX_LOBES] = std::array::from_fn(|i| sums.get(i).copied().unwrap_or_default());
+    let before: [[f32; N]; MAX_LOBES] = std::array::from_fn(|i| sums.get(i).copied().unwrap_or([0.0; N]));
     let mut set = (1 << n) - 1;
     for place in (0..n).rev() {
         sums[place] = before[last[set]];
@@ -43,7 +50,7 @@ pub(crate) fn match_lobes(family: impl Family, parent: &[Four], sums: &mut [Four
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::family::Planar;
+    use crate::fit::family::{Isotropic, Planar};
 
     #[test]
     fn a_shuffled_texel_is_put_back_in_order() {

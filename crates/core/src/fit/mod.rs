@@ -24,16 +24,15 @@ use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
 pub use assign::MAX_LOBES;
-pub use family::Four;
 pub(crate) use family::from_pole;
 pub use peaks::SHARPEST;
 
 use self::assign::{assign, shares};
-use self::coherent::with_prior;
+use self::coherent::PriorContext;
 use self::em::{iterate, log_likelihood, naturals, start_at_random, start_from_furthest};
-use self::family::{Family, Planar, Spherical};
+use self::family::{Family, Planar, Spherical, log_density};
 use self::matching::match_lobes;
-use self::refine::{LevelLobes, refine};
+use self::refine::LevelLobes;
 use self::samples::{SampleGrid, Samples, Samplings};
 use crate::grid::{Grid, Size};
 use crate::pyramid::{footprint, level_sizes};
@@ -94,12 +93,15 @@ pub struct Fit {
     pub alignment: Alignment,
 }
 
+/// Value of an attribute, four channels.
+pub type Rgba = [f32; 4];
+
 /// What it is fitted to.
 pub struct FitJob<'a> {
     /// The finest level.
     pub surface: &'a dyn Surface,
     /// Other maps of the same size whose values each lobe is to carry.
-    pub attributes: &'a [Grid<Four>],
+    pub attributes: &'a [Grid<Rgba>],
     /// Called now and then with the fraction done, from one thread.
     pub progress: &'a (dyn Fn(f64) + Sync),
 }
@@ -112,10 +114,12 @@ pub struct FittedRows<'a> {
     pub size: Size,
     /// Which of its rows.
     pub rows: Range<usize>,
+    /// Sums of a lobe: its weight, then its other statistics.
+    pub statistics: usize,
     /// Sums: the lobes of a texel one after another, texel by texel. Weights of a texel sum to one.
-    pub sums: &'a [Four],
+    pub sums: &'a [f32],
     /// For each attribute the lobes' weighted means `alpha y`, in the order of `sums`.
-    pub attributes: &'a [Vec<Four>],
+    pub attributes: &'a [Vec<Rgba>],
 }
 
 /// Rounds of EM for a texel that starts from furthest points.
@@ -165,39 +169,39 @@ pub fn fit_levels<E>(
     let size = job.surface.size();
     assert!(job.attributes.iter().all(|a| a.size() == size), "attributes are as large as the surface");
     match fit.kind {
-        LobeKind::Spherical => Fitter::new(Spherical, fit, job).run(emit),
-        LobeKind::Planar => Fitter::new(Planar, fit, job).run(emit),
+        LobeKind::Spherical => Fitter::<_, 4>::new(Spherical, fit, job).run(emit),
+        LobeKind::Planar => Fitter::<_, 4>::new(Planar, fit, job).run(emit),
         LobeKind::Peaks => peaks::fit_levels(fit.lobes, job, emit),
     }
 }
 
-struct Fitter<'a, F> {
+struct Fitter<'a, F, const N: usize> {
     family: F,
     fit: &'a Fit,
     job: &'a FitJob<'a>,
     sizes: Vec<Size>,
-    samplings: Samplings,
+    samplings: Samplings<N>,
 }
 
 /// One level whose sums are known.
-struct Level {
+pub(crate) struct Level<const N: usize> {
     size: Size,
-    sums: Vec<Four>,
+    sums: Vec<[f32; N]>,
 }
 
-impl Level {
+impl<const N: usize> Level<N> {
     /// The texel that covers the middle of texel `(x, y)` of a level of `finer` size.
     fn index_over(&self, finer: Size, (x, y): (usize, usize)) -> usize {
         over(y, finer.height, self.size.height) * self.size.width + over(x, finer.width, self.size.width)
     }
 
     /// The lobes of the texel that covers the middle of texel `(x, y)` of a level of `finer` size.
-    fn over(&self, finer: Size, lobes: usize, (x, y): (usize, usize)) -> &[Four] {
+    fn over(&self, finer: Size, lobes: usize, (x, y): (usize, usize)) -> &[[f32; N]] {
         &self.sums[self.index_over(finer, (x, y)) * lobes..][..lobes]
     }
 
     /// `theta` of every lobe of some rows, in place of their sums: what is asked of a parent by several children.
-    fn thetas(&self, family: impl Family, lobes: usize, rows: Range<usize>) -> Vec<Four> {
+    fn thetas(&self, family: impl Family<N>, lobes: usize, rows: Range<usize>) -> Vec<[f32; N]> {
         let line = self.size.width * lobes;
         self.sums[rows.start * line..rows.end * line].par_iter().map(|sums| family.natural(sums)).collect()
     }
@@ -208,7 +212,7 @@ fn over(i: usize, finer: usize, coarser: usize) -> usize {
     ((2 * i + 1) * coarser / (2 * finer)).min(coarser - 1)
 }
 
-impl<'a, F: Family> Fitter<'a, F> {
+impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
     fn new(family: F, fit: &'a Fit, job: &'a FitJob<'a>) -> Self {
         let sizes = level_sizes(job.surface.size());
         let samplings = Samplings::new(family, job.surface, &sizes);
@@ -240,7 +244,7 @@ impl<'a, F: Family> Fitter<'a, F> {
                 self.finest(levels.get(1), emit)
             }
             _ => {
-                let mut parent: Option<Level> = None;
+                let mut parent: Option<Level<N>> = None;
                 for level in (1..self.sizes.len()).rev() {
                     let made = self.descend(level, parent.as_ref());
                     self.hand_on(level, &made, emit)?;
@@ -252,37 +256,22 @@ impl<'a, F: Family> Fitter<'a, F> {
         }
     }
 
-    /// Runs `texel` on the samples and sums of every texel of a level.
-    fn each_texel(
-        &self,
-        grid: &SampleGrid,
-        level: &mut Level,
-        texel: impl Fn(usize, &Samples, &mut [Four]) + Sync,
-    ) {
-        let size = level.size;
-        let texels = level.sums.par_chunks_mut(self.fit.lobes).enumerate();
-        texels.for_each_init(Samples::default, |samples, (i, sums)| {
-            grid.gather(size, at(size, i), samples);
-            texel(i, samples, sums);
-        });
-    }
-
-    fn empty(&self, level: usize) -> Level {
+    fn empty(&self, level: usize) -> Level<N> {
         let size = self.sizes[level];
-        Level { size, sums: vec![[0.0; 4]; size.area() * self.fit.lobes] }
+        Level { size, sums: vec![[0.0; N]; size.area() * self.fit.lobes] }
     }
 
     /// Every level above the finest, each texel by itself: the likeliest that EM finds from the normals furthest apart, from
     /// the furthest of the lobes of the finer texels below it, and from seeds drawn at random.
-    fn alone(&self) -> Vec<Level> {
+    fn alone(&self) -> Vec<Level<N>> {
         let lobes = self.fit.lobes;
         let mut levels = vec![Level { size: self.sizes[0], sums: Vec::new() }];
         for level in 1..self.sizes.len() {
             let mut made = self.empty(level);
             let (size, finer) = (made.size, &levels[level - 1]);
-            self.each_texel(self.samplings.for_level(size), &mut made, |i, samples, sums| {
+            each_texel(self.samplings.for_level(size), &mut made, lobes, |i, samples, sums| {
                 let mut likeliest = f64::MIN;
-                let mut own = [[0.0; 4]; MAX_LOBES];
+                let mut own = [[0.0; N]; MAX_LOBES];
                 let own = &mut own[..lobes];
                 let mut random = Pcg64Mcg::seed_from_u64(i as u64);
                 for start in 0..ALONE_STARTS {
@@ -309,7 +298,7 @@ impl<'a, F: Family> Fitter<'a, F> {
     }
 
     /// A level started from its parent; the coarsest, which has none, by [`Self::start`].
-    fn descend(&self, level: usize, parent: Option<&Level>) -> Level {
+    fn descend(&self, level: usize, parent: Option<&Level<N>>) -> Level<N> {
         let (family, lobes) = (self.family, self.fit.lobes);
         let mut made = self.empty(level);
         let size = made.size;
@@ -324,7 +313,7 @@ impl<'a, F: Family> Fitter<'a, F> {
         };
         let prior = self.fit.alignment == Alignment::Prior && parent.is_some();
         let thetas = parent.map(|p| p.thetas(family, lobes, 0..p.size.height));
-        self.each_texel(grid, &mut made, |i, samples, sums| {
+        each_texel(grid, &mut made, lobes, |i, samples, sums| {
             match (parent, &thetas) {
                 (Some(parent), Some(thetas)) => {
                     let over = parent.index_over(size, at(size, i));
@@ -337,12 +326,13 @@ impl<'a, F: Family> Fitter<'a, F> {
             }
         });
         if let (true, Some(parent)) = (prior, parent) {
-            with_prior(self, grid, parent, &mut made);
+            let (wraps, finest) = (self.job.surface.wraps(), self.sizes[0].area());
+            family.fit_with_prior(&PriorContext { grid, parent, lobes, wraps, finest }, &mut made);
         }
         if refined && level >= FIRST_REFINED {
             let well = level >= FIRST_REFINED_WELL;
             let rounds = if well { REFINE_ROUNDS_PER_LOBE * lobes } else { FINE_REFINE_ROUNDS };
-            refine(family, grid, &mut LevelLobes { size, lobes, sums: &mut made.sums }, rounds);
+            family.refine(grid, &mut LevelLobes { size, lobes, sums: &mut made.sums }, rounds);
         }
         made.sums.par_chunks_mut(lobes).for_each(remove_light_lobes);
         made
@@ -352,14 +342,14 @@ impl<'a, F: Family> Fitter<'a, F> {
     ///
     /// Not the likeliest, nor the one of least error there: what the levels below need is lobes that divide the normals
     /// well, as in k-means, and that measured better on both counts. For the same reason EM stays short.
-    fn start(&self, samples: &Samples, sums: &mut [Four]) {
+    fn start(&self, samples: &Samples<N>, sums: &mut [[f32; N]]) {
         start_from_furthest(samples, samples, sums);
         let mut least = f32::MAX;
-        let mut best = [[0.0; 4]; MAX_LOBES];
+        let mut best = [[0.0; N]; MAX_LOBES];
         let mut random = Pcg64Mcg::seed_from_u64(0);
         for _ in 0..STARTS {
             iterate(self.family, samples, START_ROUNDS, sums);
-            let width = sums.iter().map(|s| s[0] * self.family.decode(s).variance).sum();
+            let width = sums.iter().map(|s| s[0] * self.family.width(s)).sum();
             if width < least {
                 least = width;
                 best[..sums.len()].copy_from_slice(sums);
@@ -373,21 +363,22 @@ impl<'a, F: Family> Fitter<'a, F> {
     fn hand_on<E>(
         &self,
         level: usize,
-        made: &Level,
+        made: &Level<N>,
         emit: &mut dyn FnMut(&FittedRows<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let attributes: Vec<Vec<Four>> = self.job.attributes.iter().map(|a| self.carry(made, a)).collect();
+        let attributes: Vec<Vec<Rgba>> = self.job.attributes.iter().map(|a| self.carry(made, a)).collect();
         emit(&FittedRows {
             level,
             size: made.size,
             rows: 0..made.size.height,
-            sums: &made.sums,
+            statistics: N,
+            sums: made.sums.as_flattened(),
             attributes: &attributes,
         })
     }
 
     /// Each lobe's mean of an attribute, `y_j = Σ z_ij y_i / Σ z_ij`, times its weight (Han et al. 2007, section 6.4).
-    fn carry(&self, made: &Level, attribute: &Grid<Four>) -> Vec<Four> {
+    fn carry(&self, made: &Level<N>, attribute: &Grid<Rgba>) -> Vec<Rgba> {
         let (lobes, size, fine) = (self.fit.lobes, made.size, attribute.size());
         let mut carried = vec![[0.0; 4]; made.sums.len()];
         carried.par_chunks_mut(lobes).zip(made.sums.par_chunks(lobes)).enumerate().for_each_init(
@@ -395,7 +386,7 @@ impl<'a, F: Family> Fitter<'a, F> {
             |samples, (i, (carried, sums))| {
                 let (x, y) = at(size, i);
                 self.samplings.finest().gather(size, (x, y), samples);
-                let mut theta = [[0.0; 4]; MAX_LOBES];
+                let mut theta = [[0.0; N]; MAX_LOBES];
                 naturals(self.family, sums, &mut theta[..lobes]);
                 let (rows, _) = footprint(fine.height, size.height, y);
                 let (columns, _) = footprint(fine.width, size.width, x);
@@ -404,8 +395,8 @@ impl<'a, F: Family> Fitter<'a, F> {
                 let mut mean = [0.0_f32; 4];
                 let mut z = [0.0; MAX_LOBES];
                 for (k, (r, c)) in places.enumerate() {
-                    shares(&theta[..lobes], [samples.a[k], samples.b[k], samples.c[k]], &mut z[..lobes]);
-                    let (value, weight) = (attribute.row(r)[c], samples.weight[k]);
+                    shares(&theta[..lobes], &samples.statistics(k), &mut z[..lobes]);
+                    let (value, weight) = (attribute.row(r)[c], samples.weights()[k]);
                     (0..4).for_each(|k| mean[k] += weight * value[k]);
                     for (j, carried) in carried.iter_mut().enumerate() {
                         let z = z[j] * weight;
@@ -427,19 +418,21 @@ impl<'a, F: Family> Fitter<'a, F> {
     /// The finest level, band by band: each normal is one lobe, in the place that its parent gives it.
     fn finest<E>(
         &self,
-        parent: Option<&Level>,
+        parent: Option<&Level<N>>,
         emit: &mut dyn FnMut(&FittedRows<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
         let (lobes, size) = (self.fit.lobes, self.sizes[0]);
         // One set of buffers for all bands: a band is megabytes that would come and go.
-        let mut sums = Vec::new();
-        let mut attributes: Vec<Vec<Four>> = vec![Vec::new(); self.job.attributes.len()];
+        let mut sums: Vec<[f32; N]> = Vec::new();
+        let mut attributes: Vec<Vec<Rgba>> = vec![Vec::new(); self.job.attributes.len()];
         let mut places = Vec::new();
         for start in (0..size.height).step_by(BAND) {
             let rows = start..(start + BAND).min(size.height);
             let texels = rows.len() * size.width;
             places.resize(texels, 0_usize);
-            for buffer in attributes.iter_mut().chain([&mut sums]) {
+            sums.clear();
+            sums.resize(texels * lobes, [0.0; N]);
+            for buffer in &mut attributes {
                 buffer.clear();
                 buffer.resize(texels * lobes, [0.0; 4]);
             }
@@ -459,9 +452,9 @@ impl<'a, F: Family> Fitter<'a, F> {
                         let t = self.family.statistics(row.normal(x));
                         places[x] = above.as_ref().map_or(0, |(p, first, thetas)| {
                             let at = p.index_over(size, (x, y)) - first * p.size.width;
-                            likeliest(&thetas[at * lobes..][..lobes], t)
+                            likeliest(&thetas[at * lobes..][..lobes], &t)
                         });
-                        sums[x * lobes + places[x]] = [1.0, t[0], t[1], t[2]];
+                        sums[x * lobes + places[x]] = t;
                     }
                 },
             );
@@ -470,18 +463,40 @@ impl<'a, F: Family> Fitter<'a, F> {
                     carried[i * lobes + place] = attribute.row(start + i / size.width)[i % size.width];
                 }
             }
-            emit(&FittedRows { level: 0, size, rows: rows.clone(), sums: &sums, attributes: &attributes })?;
+            emit(&FittedRows {
+                level: 0,
+                size,
+                rows: rows.clone(),
+                statistics: N,
+                sums: sums.as_flattened(),
+                attributes: &attributes,
+            })?;
             (self.job.progress)(0.9 + 0.1 * rows.end as f64 / size.height as f64);
         }
         Ok(())
     }
 }
 
+/// Runs `texel` on the samples and sums of every texel of a level.
+fn each_texel<const N: usize>(
+    grid: &SampleGrid<N>,
+    level: &mut Level<N>,
+    lobes: usize,
+    texel: impl Fn(usize, &Samples<N>, &mut [[f32; N]]) + Sync,
+) {
+    let size = level.size;
+    let texels = level.sums.par_chunks_mut(lobes).enumerate();
+    texels.for_each_init(Samples::default, |samples, (i, sums)| {
+        grid.gather(size, at(size, i), samples);
+        texel(i, samples, sums);
+    });
+}
+
 /// The lobe that a sample most likely belongs to.
-fn likeliest(thetas: &[Four], t: [f32; 3]) -> usize {
+fn likeliest<const N: usize>(thetas: &[[f32; N]], t: &[f32; N]) -> usize {
     let mut best = (0, f32::MIN);
     for (j, theta) in thetas.iter().enumerate() {
-        let log = theta[0] + theta[1] * t[0] + theta[2] * t[1] + theta[3] * t[2];
+        let log = log_density(theta, t);
         if log > best.1 {
             best = (j, log);
         }
@@ -495,23 +510,28 @@ fn at(size: Size, i: usize) -> (usize, usize) {
 }
 
 /// Removes lobes too light to store; the others take over their weight.
-fn remove_light_lobes(sums: &mut [Four]) {
-    let light = |s: &Four| s[0] < LEAST_WEIGHT;
+fn remove_light_lobes<const N: usize>(sums: &mut [[f32; N]]) {
+    let light = |s: &[f32; N]| s[0] < LEAST_WEIGHT;
     let kept: f32 = sums.iter().filter(|s| !light(s)).map(|s| s[0]).sum();
     for sums in sums.iter_mut() {
-        *sums = if light(sums) { [0.0; 4] } else { sums.map(|s| s / kept) };
+        *sums = if light(sums) { [0.0; N] } else { sums.map(|s| s / kept) };
     }
 }
 
 /// Means of all lobes of the finer texels under a texel.
-fn lobe_means(finer: &Level, lobes: usize, size: Size, (x, y): (usize, usize)) -> Samples {
+fn lobe_means<const N: usize>(
+    finer: &Level<N>,
+    lobes: usize,
+    size: Size,
+    (x, y): (usize, usize),
+) -> Samples<N> {
     let mut means = Samples::default();
     let (columns, _) = footprint(finer.size.width, size.width, x);
     let (rows, _) = footprint(finer.size.height, size.height, y);
     for r in rows {
         let line = &finer.sums[(r * finer.size.width + columns.start) * lobes..][..columns.len() * lobes];
-        for [alpha, a, b, c] in line.iter().filter(|s| s[0] > LEAST_WEIGHT) {
-            means.push(*alpha, [a / alpha, b / alpha, c / alpha]);
+        for sums in line.iter().filter(|s| s[0] > LEAST_WEIGHT) {
+            means.push(sums[0], sums.map(|s| s / sums[0]));
         }
     }
     means

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::assign::MAX_LOBES;
 use super::em::{iterate, start_from_furthest};
-use super::family::{Family, Four, Spherical};
+use super::family::{Isotropic, Spherical};
 use super::samples::{Samples, Samplings};
 use super::{FitJob, FittedRows, PARENT_ROUNDS, at};
 use crate::pyramid::level_sizes;
@@ -56,7 +56,8 @@ pub(super) fn fit_levels<E>(
                 fit_texel(samples, peaks);
             });
             done += rows.len() * size.width;
-            emit(&FittedRows { level, size: *size, rows, sums: &sums, attributes: &[] })?;
+            let sums = sums.as_flattened();
+            emit(&FittedRows { level, size: *size, rows, statistics: 4, sums, attributes: &[] })?;
             (job.progress)(done as f64 / total as f64);
         }
     }
@@ -64,10 +65,10 @@ pub(super) fn fit_levels<E>(
 }
 
 /// Sets `peaks` to those of a texel; the ones not needed get weight 0.
-fn fit_texel(samples: &Samples, peaks: &mut [Four]) {
-    let alive: Vec<usize> = (0..samples.len()).filter(|i| samples.weight[*i] > 0.0).collect();
-    let mean = |plane: &[f32]| alive.iter().map(|i| samples.weight[*i] * plane[*i]).sum::<f32>();
-    let (x, y, w) = (mean(&samples.a), mean(&samples.b), mean(&samples.c));
+fn fit_texel(samples: &Samples<4>, peaks: &mut [[f32; 4]]) {
+    let alive: Vec<usize> = (0..samples.len()).filter(|i| samples.weights()[*i] > 0.0).collect();
+    let mean = |s: usize| alive.iter().map(|i| samples.weights()[*i] * samples.planes[s][*i]).sum::<f32>();
+    let (x, y, w) = (mean(1), mean(2), mean(3));
     peaks.fill([0.0; 4]);
     if 2.0 * w - w * w - x * x - y * y < ONE_DIRECTION {
         let z = 1.0 - w;
@@ -77,7 +78,8 @@ fn fit_texel(samples: &Samples, peaks: &mut [Four]) {
     }
     if alive.len() <= peaks.len() {
         for (peak, i) in peaks.iter_mut().zip(alive) {
-            *peak = [samples.weight[i], samples.a[i], samples.b[i], SHARPEST];
+            let [_, x, y, _] = samples.statistics(i);
+            *peak = [samples.weights()[i], x, y, SHARPEST];
         }
         return;
     }
@@ -118,11 +120,12 @@ struct Peaks {
 }
 
 impl Peaks {
-    fn new(samples: &Samples, alive: &[usize]) -> Self {
+    fn new(samples: &Samples<4>, alive: &[usize]) -> Self {
         let mut low = [1.0_f32; 2];
         let mut high = [-1.0_f32; 2];
         for i in alive {
-            for (axis, v) in [samples.a[*i], samples.b[*i]].into_iter().enumerate() {
+            let [_, x, y, _] = samples.statistics(*i);
+            for (axis, v) in [x, y].into_iter().enumerate() {
                 low[axis] = low[axis].min(v - MARGIN);
                 high[axis] = high[axis].max(v + MARGIN);
             }
@@ -135,10 +138,11 @@ impl Peaks {
         let directions: Vec<[f64; 3]> = inside.map(|(x, y)| [x, y, (1.0 - x * x - y * y).sqrt()]).collect();
         let truth = directions.iter().map(|w| {
             let seen = |i: &usize| {
-                let n = [samples.a[*i], samples.b[*i], 1.0 - samples.c[*i]].map(f64::from);
+                let [_, x, y, from_pole] = samples.statistics(*i);
+                let n = [x, y, 1.0 - from_pole].map(f64::from);
                 let length = n.iter().map(|c| c * c).sum::<f64>().sqrt();
                 let u = (0..3).map(|k| w[k] * n[k]).sum::<f64>() / length;
-                f64::from(samples.weight[*i]) * u.max(0.0).powi(PROBE_EXPONENT as i32)
+                f64::from(samples.weights()[*i]) * u.max(0.0).powi(PROBE_EXPONENT as i32)
             };
             (PROBE_EXPONENT + 1.0) / std::f64::consts::TAU * alive.iter().map(seen).sum::<f64>()
         });
@@ -211,9 +215,10 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Peaks {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::family::Family;
     use levenberg_marquardt::differentiate_numerically;
 
-    fn two_groups() -> Samples {
+    fn two_groups() -> Samples<4> {
         let mut samples = Samples::default();
         for i in 0..32 {
             let t = i as f32 * 0.7;

@@ -19,7 +19,7 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::assign::{LANES, MAX_LOBES, exp};
-use super::family::{DEAD, Family, Four, Shape, ShapeSlope, gap};
+use super::family::{DEAD, Isotropic, Shape, ShapeSlope, gap};
 use super::samples::{SampleGrid, Samples};
 use crate::grid::Size;
 
@@ -45,9 +45,14 @@ struct Moving {
 }
 
 /// Refines the sums of a level for a number of rounds (whole turns of the four offsets are best).
-pub(crate) fn refine(family: impl Family, grid: &SampleGrid, level: &mut LevelLobes<'_>, rounds: usize) {
+pub(crate) fn refine(
+    family: impl Isotropic,
+    grid: &SampleGrid<4>,
+    level: &mut LevelLobes<'_, 4>,
+    rounds: usize,
+) {
     let (lobes, width) = (level.lobes, level.size.width);
-    let moving = |sums: &Four| Moving { shape: family.decode(sums), step: [0.0; 5] };
+    let moving = |sums: &[f32; 4]| Moving { shape: family.decode(sums), step: [0.0; 5] };
     let mut all: Vec<Moving> = level.sums.par_iter().map(moving).collect();
     for round in 0..rounds {
         // The last turns settle.
@@ -59,7 +64,7 @@ pub(crate) fn refine(family: impl Family, grid: &SampleGrid, level: &mut LevelLo
         let mut take = |rows: &Vec<usize>| rows.iter().filter_map(|y| lines[*y].take()).collect::<Vec<_>>();
         let tasks: Vec<(&Vec<usize>, Vec<&mut [Moving]>)> =
             rows.iter().map(|rows| (rows, take(rows))).collect();
-        tasks.into_par_iter().for_each_init(Samples::default, |samples, (rows, mut lines)| {
+        tasks.into_par_iter().for_each_init(Samples::<4>::default, |samples, (rows, mut lines)| {
             for columns in &columns {
                 let window = Window { family, grid, size: level.size, lobes, stride, columns, rows };
                 window.step(&mut lines, samples);
@@ -70,10 +75,10 @@ pub(crate) fn refine(family: impl Family, grid: &SampleGrid, level: &mut LevelLo
 }
 
 /// The sums of a level while they are being made: `lobes` after `lobes`, texel after texel.
-pub(crate) struct LevelLobes<'a> {
+pub(crate) struct LevelLobes<'a, const N: usize> {
     pub(crate) size: Size,
     pub(crate) lobes: usize,
-    pub(crate) sums: &'a mut [Four],
+    pub(crate) sums: &'a mut [[f32; N]],
 }
 
 /// `0..n` in twos, beginning at `offset`; across the edge where that leaves none alone, else the odd ones are alone.
@@ -91,7 +96,7 @@ fn pairs(n: usize, offset: usize) -> Vec<Vec<usize>> {
 
 struct Window<'a, F> {
     family: F,
-    grid: &'a SampleGrid,
+    grid: &'a SampleGrid<4>,
     size: Size,
     lobes: usize,
     stride: f32,
@@ -99,9 +104,9 @@ struct Window<'a, F> {
     rows: &'a [usize],
 }
 
-impl<F: Family> Window<'_, F> {
+impl<F: Isotropic> Window<'_, F> {
     /// Moves the texels of this window, whose rows are `lines`, by one step.
-    fn step(&self, lines: &mut [&mut [Moving]], samples: &mut Samples) {
+    fn step(&self, lines: &mut [&mut [Moving]], samples: &mut Samples<4>) {
         let (family, lobes) = (self.family, self.lobes);
         let members = self.columns.len() * self.rows.len();
         let share = 1.0 / members as f32;
@@ -144,7 +149,7 @@ impl<F: Family> Window<'_, F> {
 }
 
 /// Adds to `seen`, for each lobe, the samples' `Σ w k (1, T)`, k between the lobe and the sample.
-fn look(family: impl Family, shapes: &[Shape], samples: &Samples, seen: &mut [Four]) {
+fn look(family: impl Isotropic, shapes: &[Shape], samples: &Samples<4>, seen: &mut [[f32; 4]]) {
     let mut theta = [[0.0; 4]; MAX_LOBES];
     for (theta, shape) in theta.iter_mut().zip(shapes) {
         let variance = shape.variance + 2.0 * LOBE_VARIANCE;
@@ -162,8 +167,8 @@ fn look(family: impl Family, shapes: &[Shape], samples: &Samples, seen: &mut [Fo
     }
 }
 
-fn look_fixed<const J: usize>(theta: &[Four; MAX_LOBES], samples: &Samples, seen: &mut [Four]) {
-    let theta: &[Four; J] = theta.first_chunk().expect("J is at most MAX_LOBES");
+fn look_fixed<const J: usize>(theta: &[[f32; 4]; MAX_LOBES], samples: &Samples<4>, seen: &mut [[f32; 4]]) {
+    let theta: &[[f32; 4]; J] = theta.first_chunk().expect("J is at most MAX_LOBES");
     let sums = dispatch!(Level::new(), _simd => look_lanes::<J>(theta, samples));
     for (seen, sums) in seen.iter_mut().flatten().zip(sums.iter().flatten()) {
         *seen += sums;
@@ -171,12 +176,9 @@ fn look_fixed<const J: usize>(theta: &[Four; MAX_LOBES], samples: &Samples, seen
 }
 
 #[inline(always)]
-fn look_lanes<const J: usize>(theta: &[Four; J], samples: &Samples) -> [Four; J] {
+fn look_lanes<const J: usize>(theta: &[[f32; 4]; J], samples: &Samples<4>) -> [[f32; 4]; J] {
     let mut sums = [[[0.0_f32; LANES]; 4]; J];
-    let a = samples.a.as_chunks::<LANES>().0;
-    let b = samples.b.as_chunks::<LANES>().0;
-    let c = samples.c.as_chunks::<LANES>().0;
-    let w = samples.weight.as_chunks::<LANES>().0;
+    let [w, a, b, c] = samples.planes.each_ref().map(|plane| plane.as_chunks::<LANES>().0);
     for (((a, b), c), w) in a.iter().zip(b).zip(c).zip(w) {
         for j in 0..J {
             let [t0, t1, t2, t3] = theta[j];
@@ -193,7 +195,7 @@ fn look_lanes<const J: usize>(theta: &[Four; J], samples: &Samples) -> [Four; J]
 }
 
 /// Half the derivative of `E` by each lobe's sums; `seen` as [`look`] makes it.
-fn slope(family: impl Family, shapes: &[Shape], seen: &[Four], out: &mut [Four]) {
+fn slope(family: impl Isotropic, shapes: &[Shape], seen: &[[f32; 4]], out: &mut [[f32; 4]]) {
     for ((shape, seen), out) in shapes.iter().zip(seen).zip(out) {
         if shape.alpha <= DEAD {
             continue;
@@ -233,7 +235,7 @@ fn crowding(lobes: &[Moving], shape: &Shape) -> f32 {
 }
 
 /// Takes one step down `slopes` (by sums) for every lobe of a texel; weights sum to one afterwards.
-fn move_lobes(family: impl Family, lobes: &mut [Moving], slopes: &[Four], stride: f32) {
+fn move_lobes(family: impl Isotropic, lobes: &mut [Moving], slopes: &[[f32; 4]], stride: f32) {
     let mut crowded = [1.0; MAX_LOBES];
     for (crowded, lobe) in crowded.iter_mut().zip(lobes.iter()).filter(|(_, l)| l.shape.alpha > DEAD) {
         *crowded = crowding(lobes, &lobe.shape);

@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use glam::Vec3;
 use rayon::prelude::*;
 
 use super::assign::LANES;
@@ -11,76 +10,87 @@ use crate::grid::Size;
 use crate::pyramid::footprint;
 use crate::surface::{Surface, SurfaceRow};
 
-/// Statistics of some samples and what each weighs; padded to a multiple of [`LANES`] with weight 0.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Samples {
-    pub(crate) a: Vec<f32>,
-    pub(crate) b: Vec<f32>,
-    pub(crate) c: Vec<f32>,
-    pub(crate) weight: Vec<f32>,
+/// Samples of N statistics, the first of them one; padded to a multiple of [`LANES`] with weight 0.
+#[derive(Clone, Debug)]
+pub(crate) struct Samples<const N: usize> {
+    /// The weight of each sample in the place of the first statistic, then the others.
+    pub(crate) planes: [Vec<f32>; N],
 }
 
-impl Samples {
+impl<const N: usize> Default for Samples<N> {
+    fn default() -> Self {
+        Self { planes: [(); N].map(|()| Vec::new()) }
+    }
+}
+
+impl<const N: usize> Samples<N> {
     /// Number of samples, padding included.
     pub(crate) fn len(&self) -> usize {
-        self.weight.len()
+        self.planes[0].len()
+    }
+
+    /// Weight of each sample.
+    pub(crate) fn weights(&self) -> &[f32] {
+        &self.planes[0]
+    }
+
+    /// Statistics of a sample.
+    pub(crate) fn statistics(&self, i: usize) -> [f32; N] {
+        let mut t = [1.0; N];
+        (1..N).for_each(|s| t[s] = self.planes[s][i]);
+        t
     }
 
     /// Adds a sample.
-    pub(crate) fn push(&mut self, weight: f32, [a, b, c]: [f32; 3]) {
-        self.a.push(a);
-        self.b.push(b);
-        self.c.push(c);
-        self.weight.push(weight);
+    pub(crate) fn push(&mut self, weight: f32, statistics: [f32; N]) {
+        self.planes[0].push(weight);
+        for (plane, t) in self.planes.iter_mut().zip(statistics).skip(1) {
+            plane.push(t);
+        }
     }
 
     /// Removes all samples.
     pub(crate) fn clear(&mut self) {
-        for plane in [&mut self.a, &mut self.b, &mut self.c, &mut self.weight] {
-            plane.clear();
-        }
+        self.planes.iter_mut().for_each(Vec::clear);
     }
 
     /// Fills up to a multiple of [`LANES`].
     pub(crate) fn pad(&mut self) {
         let padded = self.len().next_multiple_of(LANES);
-        for plane in [&mut self.a, &mut self.b, &mut self.c, &mut self.weight] {
-            plane.resize(padded, 0.0);
-        }
+        self.planes.iter_mut().for_each(|plane| plane.resize(padded, 0.0));
     }
 }
 
 /// Samples of a whole map: the same number in every cell of a grid, whose weights sum to one in each.
-pub(crate) struct SampleGrid {
+pub(crate) struct SampleGrid<const N: usize> {
     /// Cells, and samples in each.
     cells: Size,
     per_cell: usize,
-    planes: [Vec<f32>; 3],
-    /// Empty when every sample weighs 1.
-    weight: Vec<f32>,
+    /// As in [`Samples`]; the first plane is empty when every sample weighs 1.
+    planes: [Vec<f32>; N],
 }
 
-impl SampleGrid {
+impl<const N: usize> SampleGrid<N> {
     /// One sample a fine texel.
-    pub(crate) fn finest(family: impl Family, surface: &dyn Surface) -> Self {
+    pub(crate) fn finest(family: impl Family<N>, surface: &dyn Surface) -> Self {
         let cells = surface.size();
-        let mut planes = [0; 3].map(|_| vec![0.0_f32; cells.area()]);
-        let [a, b, c] = &mut planes;
-        let width = cells.width;
-        a.par_chunks_exact_mut(width)
-            .zip(b.par_chunks_exact_mut(width))
-            .zip(c.par_chunks_exact_mut(width))
-            .enumerate()
-            .for_each_init(
-                || SurfaceRow::flat(width),
-                |row, (y, ((a, b), c))| {
-                    surface.read_row(y, row);
-                    for i in 0..width {
-                        [a[i], b[i], c[i]] = family.statistics(Vec3::new(row.x[i], row.y[i], row.z[i]));
-                    }
-                },
-            );
-        Self { cells, per_cell: 1, planes, weight: Vec::new() }
+        let row = |y: usize, row: &mut SurfaceRow| {
+            surface.read_row(y, row);
+            (0..cells.width).map(|i| family.statistics(row.normal(i))).collect::<Vec<[f32; N]>>()
+        };
+        let mut planes: [Vec<f32>; N] =
+            std::array::from_fn(|p| Vec::with_capacity(if p == 0 { 0 } else { cells.area() }));
+        let ys: Vec<usize> = (0..cells.height).collect();
+        for band in ys.chunks(ROWS) {
+            let rows: Vec<Vec<[f32; N]>> = band
+                .par_iter()
+                .map_init(|| SurfaceRow::flat(cells.width), |scratch, y| row(*y, scratch))
+                .collect();
+            for (s, plane) in planes.iter_mut().enumerate().skip(1) {
+                plane.extend(rows.iter().flatten().map(|t| t[s]));
+            }
+        }
+        Self { cells, per_cell: 1, planes }
     }
 
     /// True when the cells of this grid fill texels of `level` exactly.
@@ -89,34 +99,37 @@ impl SampleGrid {
     }
 
     /// Collects the samples under texel `(x, y)` of a level; their weights sum to one.
-    pub(crate) fn gather(&self, level: Size, (x, y): (usize, usize), out: &mut Samples) {
+    pub(crate) fn gather(&self, level: Size, (x, y): (usize, usize), out: &mut Samples<N>) {
         out.clear();
         let (columns, column_weight) = footprint(self.cells.width, level.width, x);
         let (rows, row_weight) = footprint(self.cells.height, level.height, y);
         let n = self.per_cell;
+        let own_weights = &self.planes[0];
+        let [weights, statistics @ ..] = out.planes.as_mut_slice() else {
+            unreachable!("the first is the weight")
+        };
         // Where cells fill the texel they weigh the same, and nothing need be worked out for each.
         let even = self.nests(level).then(|| 1.0 / (columns.len() * rows.len()) as f32);
         for j in rows {
             let start = (j * self.cells.width + columns.start) * n;
             let range = start..start + columns.len() * n;
-            out.a.extend_from_slice(&self.planes[0][range.clone()]);
-            out.b.extend_from_slice(&self.planes[1][range.clone()]);
-            out.c.extend_from_slice(&self.planes[2][range.clone()]);
+            for (out, plane) in statistics.iter_mut().zip(&self.planes[1..]) {
+                out.extend_from_slice(&plane[range.clone()]);
+            }
             if let Some(cell) = even {
-                match self.weight.get(range) {
-                    Some(weights) if !self.weight.is_empty() => {
-                        out.weight.extend(weights.iter().map(|w| w * cell))
-                    }
-                    _ => out.weight.resize(out.a.len(), cell),
+                if own_weights.is_empty() {
+                    weights.resize(weights.len() + range.len(), cell);
+                } else {
+                    weights.extend(own_weights[range].iter().map(|w| w * cell));
                 }
                 continue;
             }
             let row_weight = row_weight(j) as f32;
-            if self.weight.is_empty() {
-                out.weight.extend(columns.clone().map(|i| row_weight * column_weight(i) as f32));
+            if own_weights.is_empty() {
+                weights.extend(columns.clone().map(|i| row_weight * column_weight(i) as f32));
             } else {
-                let weights = self.weight[range].chunks_exact(n).zip(columns.clone());
-                out.weight.extend(weights.flat_map(|(w, i)| {
+                let cells = own_weights[range].chunks_exact(n).zip(columns.clone());
+                weights.extend(cells.flat_map(|(w, i)| {
                     let cell = row_weight * column_weight(i) as f32;
                     w.iter().map(move |w| w * cell)
                 }));
@@ -130,34 +143,32 @@ impl SampleGrid {
     /// The cell's samples are cut in two across their widest spread, and the widest part again, until there are
     /// enough parts; each is replaced by its weighted mean, so sums over all samples do not change.
     pub(crate) fn merge(&self, level: Size, per_cell: usize) -> Self {
-        let mut planes = [0; 3].map(|_| vec![0.0_f32; level.area() * per_cell]);
-        let mut weight = vec![0.0_f32; level.area() * per_cell];
-        let [a, b, c] = &mut planes;
         let step = level.width * per_cell;
-        let rows = a.par_chunks_exact_mut(step).zip(b.par_chunks_exact_mut(step));
-        let rows = rows.zip(c.par_chunks_exact_mut(step)).zip(weight.par_chunks_exact_mut(step));
-        rows.enumerate().for_each_init(
-            || (Samples::default(), Vec::new(), Vec::new()),
-            |(samples, points, parts), (y, (((a, b), c), w))| {
-                for x in 0..level.width {
-                    self.gather(level, (x, y), samples);
-                    points.clear();
-                    let alive = (0..samples.len()).filter(|i| samples.weight[*i] > 0.0);
-                    points
-                        .extend(alive.map(|i| [samples.weight[i], samples.a[i], samples.b[i], samples.c[i]]));
-                    cut(points, per_cell, parts);
-                    for (at, part) in (x * per_cell..).zip(parts.iter()) {
-                        [w[at], a[at], b[at], c[at]] = mean(&points[part.range.clone()]);
-                    }
+        let row = |y: usize, (samples, points, parts): &mut (Samples<N>, Vec<[f32; N]>, Vec<Part>)| {
+            let mut merged = vec![[0.0_f32; N]; step];
+            for x in 0..level.width {
+                self.gather(level, (x, y), samples);
+                points.clear();
+                let alive = (0..samples.len()).filter(|i| samples.weights()[*i] > 0.0);
+                points.extend(alive.map(|i| std::array::from_fn::<f32, N, _>(|p| samples.planes[p][i])));
+                cut(points, per_cell, parts);
+                for (at, part) in (x * per_cell..).zip(parts.iter()) {
+                    merged[at] = mean(&points[part.range.clone()]);
                 }
-            },
-        );
-        Self { cells: level, per_cell, planes, weight }
+            }
+            merged
+        };
+        let rows: Vec<Vec<[f32; N]>> = (0..level.height)
+            .into_par_iter()
+            .map_init(|| (Samples::default(), Vec::new(), Vec::new()), |scratch, y| row(y, scratch))
+            .collect();
+        let plane = |p: usize| rows.iter().flatten().map(|t| t[p]).collect();
+        Self { cells: level, per_cell, planes: std::array::from_fn(plane) }
     }
 }
 
-/// Weight, and statistics.
-type Point = [f32; 4];
+/// Rows of statistics that are in memory as such, before they are parted into planes.
+const ROWS: usize = 64;
 
 /// A run of points.
 struct Part {
@@ -170,24 +181,24 @@ struct Part {
 }
 
 impl Part {
-    fn new(points: &[Point], range: Range<usize>) -> Self {
-        let (mut low, mut high, mut weight) = ([f32::MAX; 3], [f32::MIN; 3], 0.0);
+    fn new<const N: usize>(points: &[[f32; N]], range: Range<usize>) -> Self {
+        let (mut low, mut high, mut weight) = ([f32::MAX; N], [f32::MIN; N], 0.0);
         for p in &points[range.clone()] {
             weight += p[0];
-            for k in 0..3 {
-                low[k] = low[k].min(p[k + 1]);
-                high[k] = high[k].max(p[k + 1]);
+            for k in 1..N {
+                low[k] = low[k].min(p[k]);
+                high[k] = high[k].max(p[k]);
             }
         }
         let extent = |k: usize| high[k] - low[k];
-        let axis = (1..3).fold(0, |widest, k| if extent(k) > extent(widest) { k } else { widest });
+        let axis = (2..N).fold(1, |widest, k| if extent(k) > extent(widest) { k } else { widest });
         let spread = weight * extent(axis) * extent(axis);
-        Self { range, spread, axis: axis + 1, middle: 0.5 * (low[axis] + high[axis]) }
+        Self { range, spread, axis, middle: 0.5 * (low[axis] + high[axis]) }
     }
 }
 
 /// Sorts points into at most `most` parts, each a run.
-fn cut(points: &mut [Point], most: usize, parts: &mut Vec<Part>) {
+fn cut<const N: usize>(points: &mut [[f32; N]], most: usize, parts: &mut Vec<Part>) {
     parts.clear();
     if points.is_empty() {
         return;
@@ -217,21 +228,24 @@ fn cut(points: &mut [Point], most: usize, parts: &mut Vec<Part>) {
     }
 }
 
-fn mean(points: &[Point]) -> Point {
-    let mut sums = [0.0_f32; 4];
-    for [w, a, b, c] in points {
-        for (sum, value) in sums.iter_mut().zip([*w, w * a, w * b, w * c]) {
-            *sum += value;
+/// Weighted mean of points, each a weight and its statistics.
+fn mean<const N: usize>(points: &[[f32; N]]) -> [f32; N] {
+    let mut sums = [0.0_f32; N];
+    for p in points {
+        sums[0] += p[0];
+        for k in 1..N {
+            sums[k] += p[0] * p[k];
         }
     }
-    let [w, a, b, c] = sums;
-    [w, a / w, b / w, c / w]
+    let weight = sums[0];
+    sums[1..].iter_mut().for_each(|sum| *sum /= weight);
+    sums
 }
 
 /// Samples of a whole map for every level: the fine normals, and merged ones where that pays.
-pub(crate) struct Samplings {
-    finest: SampleGrid,
-    merged: Vec<SampleGrid>,
+pub(crate) struct Samplings<const N: usize> {
+    finest: SampleGrid<N>,
+    merged: Vec<SampleGrid<N>>,
 }
 
 /// First level that is merged, and samples kept in each of its cells and of every coarser level's.
@@ -241,11 +255,11 @@ pub(crate) struct Samplings {
 const MERGED_FROM: usize = 4;
 const MERGED_SAMPLES: usize = 128;
 
-impl Samplings {
+impl<const N: usize> Samplings<N> {
     /// Reads the surface and merges as far as levels nest; `sizes` are those of all levels.
-    pub(crate) fn new(family: impl Family, surface: &dyn Surface, sizes: &[Size]) -> Self {
+    pub(crate) fn new(family: impl Family<N>, surface: &dyn Surface, sizes: &[Size]) -> Self {
         let finest = SampleGrid::finest(family, surface);
-        let mut merged: Vec<SampleGrid> = Vec::new();
+        let mut merged: Vec<SampleGrid<N>> = Vec::new();
         for size in sizes.iter().skip(MERGED_FROM) {
             let from = merged.last().unwrap_or(&finest);
             if !from.nests(*size) {
@@ -258,12 +272,12 @@ impl Samplings {
     }
 
     /// The fine normals.
-    pub(crate) fn finest(&self) -> &SampleGrid {
+    pub(crate) fn finest(&self) -> &SampleGrid<N> {
         &self.finest
     }
 
     /// The coarsest grid whose cells are smaller than the texels of this level and fill them.
-    pub(crate) fn for_level(&self, size: Size) -> &SampleGrid {
+    pub(crate) fn for_level(&self, size: Size) -> &SampleGrid<N> {
         self.merged.iter().rev().find(|g| g.cells != size && g.nests(size)).unwrap_or(&self.finest)
     }
 }
@@ -279,11 +293,11 @@ mod tests {
         let surface = (procedural::find("foil").unwrap().build)(Size::new(64, 64).unwrap());
         let sizes = crate::pyramid::level_sizes(surface.size());
         let all = Samplings::new(Spherical, &*surface, &sizes);
-        let sums = |grid: &SampleGrid, size: Size| {
+        let sums = |grid: &SampleGrid<4>, size: Size| {
             let mut samples = Samples::default();
             grid.gather(size, (0, 0), &mut samples);
-            let total = |v: &[f32]| samples.weight.iter().zip(v).map(|(w, v)| f64::from(w * v)).sum::<f64>();
-            [total(&vec![1.0; samples.len()]), total(&samples.a), total(&samples.b), total(&samples.c)]
+            let term = |i: usize, s: usize| f64::from(samples.weights()[i] * samples.statistics(i)[s]);
+            [0, 1, 2, 3].map(|s| (0..samples.len()).map(|i| term(i, s)).sum::<f64>())
         };
         for size in &sizes[5..] {
             let merged = all.for_level(*size);
@@ -301,11 +315,11 @@ mod tests {
         let grid = SampleGrid::finest(Spherical, &*surface);
         let mut samples = Samples::default();
         grid.gather(Size::new(2, 1).unwrap(), (0, 0), &mut samples);
-        let weights: Vec<f32> = samples.weight[..9].to_vec();
+        let weights: Vec<f32> = samples.weights()[..9].to_vec();
         for (w, expected) in weights.iter().zip([0.4, 0.4, 0.2].repeat(3)) {
             assert!((w - expected / 3.0).abs() < 1e-7);
         }
-        assert!(samples.weight[9..].iter().all(|w| *w == 0.0) && samples.len() == LANES);
+        assert!(samples.weights()[9..].iter().all(|w| *w == 0.0) && samples.len() == LANES);
     }
 
     #[test]

@@ -11,7 +11,7 @@ use glam::{DVec2, DVec3};
 use super::mixture::{Cosine, LobeSums, MixtureEvaluator, NormalLobe, effective, mean_of, parse_mixture};
 use super::{Decoded, Evaluator, Method, PlanarLobe, Representation, Row, Sample};
 use crate::brdf::Lobe;
-use crate::fit::{Fit, Four, LobeKind};
+use crate::fit::{Fit, LobeKind};
 use crate::shader::Shader;
 use crate::units::SlopeVariance;
 
@@ -70,7 +70,7 @@ fn planar_cosine(w: DVec3, mu: DVec3) -> f64 {
 impl Gmm {
     fn lobes(&self, sums: &LobeSums) -> Vec<NormalLobe> {
         let total = sums.total();
-        let lobe = |(layer, &[alpha, x, y, q]): (usize, &Four)| {
+        let lobe = |(layer, &[alpha, x, y, q]): (usize, &[f32; 4])| {
             let alpha = f64::from(alpha);
             let (x, y, q) = (f64::from(x) / alpha, f64::from(y) / alpha, f64::from(q) / alpha);
             let second = q - x * x - y * y;
@@ -156,11 +156,12 @@ impl Representation for Gmm {
     }
 
     /// From `alpha (2 sigma² + |mu|²)` to what the paper stores.
-    fn store_lobe(&self, &[alpha, x, y, q]: &Four) -> Four {
-        if !self.printed || alpha <= 0.0 {
-            return [alpha, x, y, q];
+    fn store_lobe(&self, sums: &[f32], channels: &mut [f32]) {
+        channels.copy_from_slice(sums);
+        let [alpha, x, y, q] = channels else { return };
+        if self.printed && *alpha > 0.0 {
+            let square = (*x * *x + *y * *y) / *alpha;
+            *q = square + 0.5 * (*q - square);
         }
-        let square = (x * x + y * y) / alpha;
-        [alpha, x, y, square + 0.5 * (q - square)]
     }
 }

@@ -4,13 +4,13 @@ use glam::DVec3;
 
 use super::Evaluator;
 use crate::brdf::Lobe;
-use crate::fit::{Alignment, Fit, Four, LobeKind, MAX_LOBES};
+use crate::fit::{Alignment, Fit, LobeKind, MAX_LOBES};
 use crate::units::SlopeVariance;
 
 /// Sums of every lobe: weight, then three statistics times the weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LobeSums {
-    sums: [Four; MAX_LOBES],
+    sums: [[f32; 4]; MAX_LOBES],
     count: usize,
 }
 
@@ -36,13 +36,13 @@ impl LobeSums {
     }
 
     /// Every lobe changed by `f`.
-    pub(super) fn map(mut self, f: impl Fn(&Four) -> Four) -> Self {
+    pub(super) fn map(mut self, f: impl Fn(&[f32; 4]) -> [f32; 4]) -> Self {
         self.sums[..self.count].iter_mut().for_each(|s| *s = f(s));
         self
     }
 
     /// Adds to lobe `j`.
-    pub(super) fn add(&mut self, j: usize, values: Four, weight: f32) {
+    pub(super) fn add(&mut self, j: usize, values: [f32; 4], weight: f32) {
         self.sums[j].iter_mut().zip(values).for_each(|(sum, v)| *sum += weight * v);
     }
 
@@ -53,12 +53,12 @@ impl LobeSums {
 
     /// Every lobe's sums.
     #[must_use]
-    pub fn all(&self) -> &[Four] {
+    pub fn all(&self) -> &[[f32; 4]] {
         &self.sums[..self.count]
     }
 
     /// Those of lobes that say something, with their places.
-    pub(super) fn alive(&self) -> impl Iterator<Item = (usize, &Four)> {
+    pub(super) fn alive(&self) -> impl Iterator<Item = (usize, &[f32; 4])> {
         self.all().iter().enumerate().filter(|(_, s)| s[0] > DEAD)
     }
 

@@ -43,7 +43,7 @@ use std::fmt::Debug;
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
 use crate::brdf::{Brdf, Lambert, Lobe};
-use crate::fit::{Fit, Four};
+use crate::fit::Fit;
 use crate::shader::Shader;
 use crate::surface::SurfaceRow;
 use crate::units::SlopeVariance;
@@ -137,9 +137,10 @@ pub trait Representation: Debug + Send + Sync {
         None
     }
 
-    /// A fitted lobe's sums as this method's channels.
-    fn store_lobe(&self, sums: &Four) -> Four {
-        *sums
+    /// Writes a fitted lobe's sums as this method's channels, four for each of its layers; spare ones are 1.
+    fn store_lobe(&self, sums: &[f32], channels: &mut [f32]) {
+        channels[..sums.len()].copy_from_slice(sums);
+        channels[sums.len()..].fill(1.0);
     }
 
     /// False when channels of several texels must not be mixed, and each texel be shaded by itself.
@@ -325,8 +326,8 @@ pub trait Method: Debug + Send + Sync {
     /// What is to be fitted; `None` for a method whose sums come straight from the fine normals.
     fn fit(&self) -> Option<Fit>;
 
-    /// A fitted lobe's sums as this method's channels.
-    fn store_lobe(&self, sums: &Four) -> Four;
+    /// Writes a fitted lobe's sums as this method's channels, four for each of its layers.
+    fn store_lobe(&self, sums: &[f32], channels: &mut [f32]);
 
     /// False when channels of several texels must not be mixed, and each texel be shaded by itself.
     fn filterable(&self) -> bool;
@@ -428,8 +429,8 @@ impl<R: Representation> Method for R {
         Representation::fit(self)
     }
 
-    fn store_lobe(&self, sums: &Four) -> Four {
-        Representation::store_lobe(self, sums)
+    fn store_lobe(&self, sums: &[f32], channels: &mut [f32]) {
+        Representation::store_lobe(self, sums, channels);
     }
 
     fn filterable(&self) -> bool {

@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::mixture::{Cosine, LobeSums, MixtureEvaluator, NormalLobe, cosine, effective, mean_of};
 use super::{Decoded, Evaluator, Method, MixtureLobe, Representation, Row, Sample};
 use crate::brdf::Lobe;
-use crate::fit::{Alignment, Fit, Four, LobeKind, MAX_LOBES, SHARPEST};
+use crate::fit::{Alignment, Fit, LobeKind, MAX_LOBES, SHARPEST};
 use crate::shader::Shader;
 use crate::units::SlopeVariance;
 
@@ -59,7 +59,7 @@ impl From<PhongPeaks> for Decoded {
 
 impl Phong {
     fn peaks(sums: &LobeSums) -> Vec<NormalLobe> {
-        let peak = |(layer, &[weight, x, y, exponent]): (usize, &Four)| {
+        let peak = |(layer, &[weight, x, y, exponent]): (usize, &[f32; 4])| {
             // Held to the disk and to exponents that mean something, whatever a damaged file holds.
             let (x, y) = (f64::from(x), f64::from(y));
             let held = x.hypot(y).max(1.0);

@@ -15,7 +15,7 @@ use super::mixture::{
 };
 use super::{Decoded, Evaluator, Method, MixtureLobe, Representation, Row, Sample};
 use crate::brdf::Lobe;
-use crate::fit::{Fit, Four, LobeKind, from_pole};
+use crate::fit::{Fit, LobeKind, from_pole};
 use crate::shader::Shader;
 use crate::units::SlopeVariance;
 
@@ -54,10 +54,15 @@ fn parse(words: &[&str]) -> Result<Box<dyn Method>, String> {
 const MIN_LENGTH: f64 = 1e-3;
 
 impl Vmf {
+    /// From `alpha (1 - r.z)` to `alpha r.z`, where asked; and back, since both are `alpha` less the other.
+    fn turned(&self, &[alpha, x, y, w]: &[f32; 4]) -> [f32; 4] {
+        [alpha, x, y, if self.origin { alpha - w } else { w }]
+    }
+
     /// The lobes that the sums decode to, dead ones left out.
     fn lobes(sums: &LobeSums) -> Vec<NormalLobe> {
         let total = sums.total();
-        let lobe = |(layer, &[alpha, x, y, w]): (usize, &Four)| {
+        let lobe = |(layer, &[alpha, x, y, w]): (usize, &[f32; 4])| {
             let alpha = f64::from(alpha);
             let (x, y, w) = (f64::from(x) / alpha, f64::from(y) / alpha, f64::from(w) / alpha);
             // 1 - |r|² of r = (x, y, 1 - w).
@@ -121,16 +126,18 @@ impl Representation for Vmf {
     }
 
     fn pack(&self, sums: &LobeSums, channels: &mut [f32]) {
-        sums.map(|lobe| Representation::store_lobe(self, lobe)).to_channels(channels);
+        sums.map(|lobe| self.turned(lobe)).to_channels(channels);
     }
 
-    /// From `alpha (1 - r.z)` to `alpha r.z`, where asked; and back, since both are `alpha` less the other.
-    fn store_lobe(&self, &[alpha, x, y, w]: &Four) -> Four {
-        [alpha, x, y, if self.origin { alpha - w } else { w }]
+    fn store_lobe(&self, sums: &[f32], channels: &mut [f32]) {
+        channels.copy_from_slice(sums);
+        if let Some(lobe) = channels.first_chunk_mut() {
+            *lobe = self.turned(lobe);
+        }
     }
 
     fn unpack(&self, channels: &[f32]) -> LobeSums {
-        LobeSums::from_channels(self.fit.lobes, channels).map(|lobe| Representation::store_lobe(self, lobe))
+        LobeSums::from_channels(self.fit.lobes, channels).map(|lobe| self.turned(lobe))
     }
 
     fn decode(&self, sums: &LobeSums) -> VmfMixture {

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::bake::Bake;
-use crate::fit::{Four, LobeKind};
+use crate::fit::{LobeKind, Rgba};
 use crate::grid::{Grid, Size};
 use crate::ndf::{Decoded, Method};
 use crate::pyramid::{Precision, Pyramid};
@@ -18,7 +18,7 @@ pub struct BakedMaterial {
     /// How many attributes lobes carry: albedo with roughness, and specular colour.
     pub attributes: usize,
     /// The same as maps of their own, finest level, for methods whose lobes carry none.
-    pub params: Vec<Grid<Four>>,
+    pub params: Vec<Grid<Rgba>>,
 }
 
 impl BakedMaterial {

@@ -105,9 +105,7 @@ impl Export<'_> {
         let table = self.method.shader_table(self.brdf, least, most);
         let entry = |(i, entry): (usize, &[f32; 12])| {
             let (first, last, lobe, diffuse) = (3 * i, 3 * i + 2, entry[0], entry[11]);
-            format!(
-                "    brdf.table[{first}].x = {lobe:?};\n    brdf.table[{last}].w = {diffuse:?};\n"
-            )
+            format!("    brdf.table[{first}].x = {lobe:?};\n    brdf.table[{last}].w = {diffuse:?};\n")
         };
         let brdf = format!(
             "// The lobe {}, in the model `{}`.\nfn ndf_brdf() -> Brdf {{\n    var brdf: Brdf;\n    \
