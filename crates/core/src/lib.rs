@@ -12,11 +12,11 @@
 //! // A surface: here a built-in one, elsewhere a normal or height map.
 //! let surface = (procedural::find("v-groove").unwrap().build)(Size::new(64, 64)?);
 //! // Bake it into every level of a representation of your choice ...
-//! let method = ndf::parse("slopes")?;
+//! let method = "slopes".parse::<AnyMethod>()?;
 //! let bake = Bake { surface: &*surface, method: &*method, precision: Precision::Half, progress: &|_| () };
 //! let (pyramid, _) = bake.to_pyramid();
 //! // ... and shade the coarsest texel with any BRDF, chosen now and not when baking.
-//! let brdf = brdf::parse("ggx:0.2")?;
+//! let brdf = "ggx:0.2".parse::<AnyLobe>()?;
 //! let straight_up = [DVec3::Z];
 //! let mut reflected = [0.0];
 //! let last = pyramid.sizes().len() - 1;
@@ -43,3 +43,4 @@ pub mod sphere;
 pub mod surface;
 pub mod tone;
 pub mod units;
+pub mod words;

@@ -7,57 +7,120 @@
 use std::fmt::Display;
 
 use crate::brdf::{Lobe, Microfacets};
-use crate::ndf::Method;
+use crate::ndf::{FormKind, Method};
 
 /// A method's own part of a shader.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shader {
-    /// Constants that its text refers to, as declarations.
-    pub constants: String,
-    /// Entries of the table that [`Method::shader_table`] makes.
-    pub table: usize,
-    /// Its text.
-    pub sources: &'static [&'static str],
-    /// True when its text has `reflect_displaced` for itself: it knows of displacement.
-    pub displaces: bool,
-    /// What lights its texels by an environment: `reflect_environment`.
-    pub environment: &'static str,
+    form: FormKind,
+    constants: String,
+    entries: usize,
+    sources: &'static [&'static str],
 }
-
-/// What makes a method's texels sums of isotropic lobes.
-const MIXTURE: &str = include_str!("ndf/mixture.wgsl");
 
 /// What some methods and all environments have.
 const SPHERE: &str = include_str!("sphere.wgsl");
 
 impl Shader {
-    /// One without constants or a table.
+    /// Text of a method whose texels are shaded in this form, without constants or a table.
+    ///
+    /// What the text must hold besides `decode` is said in the file of the form: `ndf/mixture.wgsl` or `ndf/whole.wgsl`.
     #[must_use]
-    pub(crate) fn new(sources: &'static [&'static str]) -> Self {
-        let environment = if sources.contains(&MIXTURE) {
-            include_str!("ndf/mixture_environment.wgsl")
-        } else {
-            include_str!("ndf/whole_environment.wgsl")
-        };
-        Self { constants: String::new(), table: 1, sources, displaces: false, environment }
+    pub fn new(form: FormKind, sources: &'static [&'static str]) -> Self {
+        Self { form, constants: String::new(), entries: 1, sources }
     }
 
-    /// One whose text has `reflect_displaced`.
+    /// The same, with a constant that the text refers to.
     #[must_use]
-    pub(crate) fn displaces(self) -> Self {
-        Self { displaces: true, environment: include_str!("ndf/leadr_environment.wgsl"), ..self }
-    }
-
-    /// Adds a constant.
-    #[must_use]
-    pub(crate) fn constant(mut self, name: &str, value: impl Constant) -> Self {
+    pub fn constant(mut self, name: &str, value: impl Constant) -> Self {
         self.constants += &value.declare(name);
         self
+    }
+
+    /// The same, with a table of so many entries, which [`Method::shader_table`] makes.
+    #[must_use]
+    pub fn table(self, entries: usize) -> Self {
+        Self { entries, ..self }
+    }
+
+    /// Form that the text shades.
+    #[must_use]
+    pub fn form(&self) -> FormKind {
+        self.form
+    }
+
+    /// Entries of the table; one at least, of zeros for a method without a table.
+    #[must_use]
+    pub fn entries(&self) -> usize {
+        self.entries
+    }
+
+    /// Texts that shade texels of the form.
+    fn form_sources(&self) -> &'static [&'static str] {
+        const PLAIN: &str = include_str!("ndf/undisplaced.wgsl");
+        const WHOLE: &str = include_str!("ndf/whole.wgsl");
+        match self.form {
+            FormKind::Lobes => &[include_str!("ndf/mixture.wgsl"), PLAIN],
+            FormKind::Slopes => &[WHOLE, include_str!("ndf/leadr.wgsl")],
+            FormKind::Whole => &[WHOLE, PLAIN],
+        }
+    }
+
+    /// Text that lights texels of the form by an environment.
+    fn environment_source(&self) -> &'static str {
+        match self.form {
+            FormKind::Lobes => include_str!("ndf/mixture_environment.wgsl"),
+            FormKind::Slopes => include_str!("ndf/leadr_environment.wgsl"),
+            FormKind::Whole => include_str!("ndf/whole_environment.wgsl"),
+        }
+    }
+}
+
+/// Roughnesses for which a [`LobeTable`] holds a lobe's numbers.
+pub const TABLE_ROUGHNESSES: usize = 11;
+
+/// Numbers of a lobe that a method's shader wants, entry by entry: each at [`TABLE_ROUGHNESSES`] roughnesses, and of the diffuse lobe.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LobeTable {
+    entries: Vec<[f32; TABLE_ROUGHNESSES + 1]>,
+}
+
+impl LobeTable {
+    /// Zeros.
+    #[must_use]
+    pub fn new(entries: usize) -> Self {
+        Self { entries: vec![[0.0; TABLE_ROUGHNESSES + 1]; entries] }
+    }
+
+    /// Sets the numbers of the lobe at a roughness, counted from the least.
+    pub fn set(&mut self, roughness: usize, numbers: &[f64]) {
+        self.entries.iter_mut().zip(numbers).for_each(|(entry, number)| entry[roughness] = *number as f32);
+    }
+
+    /// Sets the numbers of the diffuse lobe.
+    pub fn set_diffuse(&mut self, numbers: &[f64]) {
+        self.set(TABLE_ROUGHNESSES, numbers);
+    }
+
+    /// Every entry: the lobe's number at each roughness.
+    pub fn lobe(&self) -> impl Iterator<Item = &[f32]> {
+        self.entries.iter().map(|entry| &entry[..TABLE_ROUGHNESSES])
+    }
+
+    /// Every entry's number of the diffuse lobe.
+    pub fn diffuse(&self) -> impl Iterator<Item = f32> {
+        self.entries.iter().map(|entry| entry[TABLE_ROUGHNESSES])
+    }
+
+    /// All numbers as shaders lay them out, entry by entry, the diffuse lobe's last in each.
+    #[must_use]
+    pub fn as_flat(&self) -> &[f32] {
+        self.entries.as_flattened()
     }
 }
 
 /// A value that WGSL has a type for.
-pub(crate) trait Constant: Display {
+pub trait Constant: Display {
     /// Name of the type.
     const TYPE: &str;
     /// What follows a number of this type.
@@ -100,24 +163,27 @@ pub const LOOKUP: &str = include_str!("lookup.wgsl");
 /// `attributes` (0 to 2) is how many colours each lobe carries: albedo with roughness, and specular colour.
 ///
 /// # Panics
-/// When there are attributes and the method has no fitted lobes to carry them.
+/// When there are attributes and the method has no lobes to carry them.
 #[must_use]
 pub fn link(method: &dyn Method, lobe: &dyn Lobe, attributes: usize) -> String {
-    assert!(attributes == 0 || method.fit().is_some(), "only fitted lobes carry attributes");
+    assert!(attributes == 0 || method.carries_attributes(), "only fitted lobes carry attributes");
     let own = method.shader();
     let layers = method.layers() as u32;
+    let (lobes, layers_each) =
+        method.lobe_layout().map_or((0, 0), |layout| (layout.count as u32, layout.layers_each as u32));
     let constants = [
         ("LAYERS", layers),
+        ("LOBES", lobes),
+        ("LAYERS_EACH", layers_each),
         ("ATTRIBUTES", attributes as u32),
-        ("ALL_LAYERS", layers * (1 + attributes as u32)),
-        ("TABLE", own.table as u32),
+        ("ALL_LAYERS", method.layers_with(attributes) as u32),
+        ("TABLE", own.entries as u32),
     ];
     let mut text: String = constants.iter().map(|(name, value)| value.declare(name)).collect();
-    text += &own.displaces.declare("DISPLACES");
+    text += &method.knows_displacement().declare("KNOWS_DISPLACEMENT");
     text += &own.constants;
-    let plain: &[&str] = if own.displaces { &[] } else { &[include_str!("ndf/undisplaced.wgsl")] };
     let lobe = lobe.shader();
-    for source in SHARED.iter().chain([&&*lobe]).chain(own.sources).chain(plain) {
+    for source in SHARED.iter().chain([&&*lobe]).chain(own.sources).chain(own.form_sources()) {
         text.push('\n');
         text += source;
     }
@@ -141,7 +207,7 @@ pub fn link_environment(method: &dyn Method, lobe: &dyn Lobe) -> String {
     let own = method.shader();
     let mut text = (lobe.microfacets() == Microfacets::Beckmann).declare("GAUSSIAN_FACETS");
     let sphere = (!own.sources.contains(&SPHERE)).then_some(SPHERE);
-    for source in ENVIRONMENT.iter().copied().chain(sphere).chain([own.environment]) {
+    for source in ENVIRONMENT.iter().copied().chain(sphere).chain([own.environment_source()]) {
         text.push('\n');
         text += source;
     }

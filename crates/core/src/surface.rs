@@ -10,6 +10,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use crate::grid::{Grid, Size};
+use crate::ndf::Method;
 use crate::pyramid::Pyramid;
 
 /// What lies beyond the edge of a map, on one axis.
@@ -145,7 +146,7 @@ pub trait Surface: Send + Sync {
     }
 
     /// The map of it that a method (by its spelling) has baked before, if it comes with one.
-    fn baked(&self, _method: &str) -> Option<&Pyramid> {
+    fn baked(&self, _method: &dyn Method) -> Option<&Pyramid> {
         None
     }
 }

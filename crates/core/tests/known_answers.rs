@@ -4,14 +4,15 @@
 
 use glam::DVec3;
 use ndfmap_core::bake::Bake;
+use ndfmap_core::brdf::AnyLobe;
 use ndfmap_core::grid::Size;
 use ndfmap_core::measure::{DISK_RADIUS, TexelTruth};
+use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::procedural::{self, GROOVE_SLOPE};
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::sphere::DiskLattice;
 use ndfmap_core::surface::Surface;
 use ndfmap_core::units::SlopeVariance;
-use ndfmap_core::{brdf, ndf};
 
 fn groove() -> Box<dyn Surface> {
     (procedural::find("v-groove").unwrap().build)(Size::new(64, 64).unwrap())
@@ -24,7 +25,7 @@ fn flanks() -> [DVec3; 2] {
 
 /// The effective lobe of the coarsest texel at these directions.
 fn coarsest(surface: &dyn Surface, method: &str, lobe: &str, directions: &[DVec3]) -> Vec<f64> {
-    let (method, lobe) = (ndf::parse(method).unwrap(), brdf::parse(lobe).unwrap());
+    let (method, lobe) = (method.parse::<AnyMethod>().unwrap(), lobe.parse::<AnyLobe>().unwrap());
     let bake = Bake { surface, method: &*method, precision: Precision::Single, progress: &|_| () };
     let (pyramid, _) = bake.to_pyramid();
     let mut out = vec![0.0; directions.len()];
@@ -35,7 +36,7 @@ fn coarsest(surface: &dyn Surface, method: &str, lobe: &str, directions: &[DVec3
 
 #[test]
 fn a_v_groove_has_two_lobes() {
-    let lobe = brdf::parse("blinn-phong:400").unwrap();
+    let lobe = "blinn-phong:400".parse::<AnyLobe>().unwrap();
     let lattice = DiskLattice::new(201, DISK_RADIUS);
     let surface = groove();
     let truth = TexelTruth::new(&*surface, &*lobe, &lattice).texel(Size::new(1, 1).unwrap(), 0, 0);
@@ -71,7 +72,7 @@ fn sh_2_shades_a_v_groove_with_lambert_in_closed_form() {
         assert!((got - expected.max(0.0)).abs() < 1e-6, "{w}: {got} {expected}");
     }
     // And the truth itself, which order 2 meets to about 0.03 of a full cosine.
-    let lambert = brdf::parse("lambert").unwrap();
+    let lambert = "lambert".parse::<AnyLobe>().unwrap();
     let lattice = DiskLattice::new(16, DISK_RADIUS);
     let surface = groove();
     let truth = TexelTruth::new(&*surface, &*lambert, &lattice).texel(Size::new(1, 1).unwrap(), 0, 0);
@@ -86,7 +87,7 @@ fn gaussian_noise_is_what_slopes_are_exact_for() {
     let size = Size::new(256, 256).unwrap();
     let (x, y) = (SlopeVariance::new(0.04).unwrap(), SlopeVariance::new(0.005).unwrap());
     let surface = procedural::gaussian_noise(size, x, y, 3);
-    let lobe = brdf::parse("beckmann:0.2").unwrap();
+    let lobe = "beckmann:0.2".parse::<AnyLobe>().unwrap();
     let lattice = DiskLattice::new(64, DISK_RADIUS);
     let truth = TexelTruth::new(&*surface, &*lobe, &lattice).texel(Size::new(1, 1).unwrap(), 0, 0);
     let error = |method: &str| {

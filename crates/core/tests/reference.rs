@@ -4,12 +4,13 @@
 
 use glam::{DVec3, Vec3};
 use ndfmap_core::bake::Bake;
+use ndfmap_core::brdf::AnyLobe;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::measure::TexelTruth;
+use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::sphere::{DiskLattice, sh_count, spherical_harmonics};
 use ndfmap_core::surface::{NormalGrid, Wraps};
-use ndfmap_core::{brdf, ndf};
 use serde_json::Value;
 
 fn expected() -> Value {
@@ -28,7 +29,7 @@ fn direction(value: &Value) -> DVec3 {
 fn zonal_coefficients() {
     let expected = expected();
     for (spelling, values) in expected["zonal"].as_object().unwrap() {
-        let rho = brdf::parse(spelling).unwrap().zonal(16);
+        let rho = spelling.parse::<AnyLobe>().unwrap().zonal(16);
         for (l, (got, expected)) in rho.iter().zip(numbers(values)).enumerate() {
             // scipy's adaptive rule is asked for 1e-13 and reaches about 1e-11 on the narrow lobes.
             assert!((got - expected).abs() < 1e-10, "{spelling} l = {l}: {got} {expected}");
@@ -57,7 +58,7 @@ fn effective_lobes_of_explicit_normals() {
         expected["normals"].as_array().unwrap().iter().map(|n| direction(n).as_vec3()).collect();
     let size = Size::new(8, 4).unwrap();
     let surface = NormalGrid { normals: Grid::from_vec(size, normals).unwrap(), wraps: Wraps::default() };
-    let lobe = brdf::parse("blinn-phong:50").unwrap();
+    let lobe = "blinn-phong:50".parse::<AnyLobe>().unwrap();
     let w = [direction(&expected["w"])];
     for (method, value) in expected["blinn-phong:50"].as_object().unwrap() {
         let value = value.as_f64().unwrap();
@@ -65,7 +66,7 @@ fn effective_lobes_of_explicit_normals() {
             let lattice = DiskLattice { directions: w.to_vec(), rows: vec![(w[0].y, 0..1)] };
             TexelTruth::new(&surface, &*lobe, &lattice).texel(Size { width: 1, height: 1 }, 0, 0)[0]
         } else {
-            let method = ndf::parse(method).unwrap();
+            let method = method.parse::<AnyMethod>().unwrap();
             let bake =
                 Bake { surface: &surface, method: &*method, precision: Precision::Single, progress: &|_| () };
             let (pyramid, _) = bake.to_pyramid();

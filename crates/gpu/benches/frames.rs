@@ -9,7 +9,7 @@ use ndfmap_core::grid::Size;
 use ndfmap_core::light::environment::{SceneEnvironment, Technique, builtin};
 use ndfmap_core::lookup::Filtering;
 use ndfmap_core::metrics::{color_error, relative_l2};
-use ndfmap_core::ndf::{self, Method};
+use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{self, Scene, SceneOptions};
 use ndfmap_gpu::{
@@ -55,8 +55,8 @@ fn median(mut times: Vec<f64>) -> f64 {
 }
 
 /// Methods by their spellings.
-fn parsed<'s>(spellings: &[&'s str]) -> Outcome<Vec<(&'s str, Box<dyn Method>)>> {
-    spellings.iter().map(|m| Ok((*m, ndf::parse(m)?))).collect()
+fn parsed<'s>(spellings: &[&'s str]) -> Outcome<Vec<(&'s str, AnyMethod)>> {
+    spellings.iter().map(|m| Ok((*m, m.parse::<AnyMethod>()?))).collect()
 }
 
 /// How a method is drawn here: lobes that are not aligned need every texel shaded.
@@ -77,9 +77,9 @@ impl Bench<'_> {
     fn maps<'m, 's>(
         &self,
         scene: &Scene,
-        methods: &'m [(&'s str, Box<dyn Method>)],
+        methods: &'m [(&'s str, AnyMethod)],
     ) -> Outcome<Vec<(&'s str, Maps<'m>)>> {
-        let bake = |(name, method): &'m (&'s str, Box<dyn Method>)| {
+        let bake = |(name, method): &'m (&'s str, AnyMethod)| {
             let maps = Maps::new(self.device, &scene.materials, &**method, Precision::Half, &|_| ())?;
             Ok((*name, maps))
         };
@@ -163,7 +163,7 @@ impl Bench<'_> {
         let mut scene = staged(name, time, size)?;
         scene.displace(1.0, false)?;
         let canvas = Canvas::new(self.device, size, Antialiasing::Sharp)?;
-        let method = ndf::parse("slopes")?;
+        let method = "slopes".parse::<AnyMethod>()?;
         let maps =
             |scene: &Scene| Maps::new(self.device, &scene.materials, &*method, Precision::Half, &|_| ());
         let (flat_maps, maps) = (maps(&flat)?, maps(&scene)?);
@@ -235,7 +235,7 @@ impl Bench<'_> {
         let scene = staged("creature", 0.3, size)?;
         let geometry = Geometry::new(self.device, &scene)?;
         let shown = SceneView { scene: &scene, geometry: &geometry, camera: &scene.camera };
-        let method = ndf::parse("vmf:6")?;
+        let method = "vmf:6".parse::<AnyMethod>()?;
         let all = [("vmf:6", Maps::new(self.device, &scene.materials, &*method, Precision::Half, &|_| ())?)];
         for outlines in [Antialiasing::Sharp, Antialiasing::Multisampled] {
             let canvas = Canvas::new(self.device, size, outlines)?;
@@ -250,7 +250,7 @@ impl Bench<'_> {
 /// From nothing to the first picture, baking apart.
 fn start(spelling: &str, size: Size) -> Outcome<()> {
     let scene = staged("disk", 0.1, size)?;
-    let method = ndf::parse(spelling)?;
+    let method = spelling.parse::<AnyMethod>()?;
     let begin = Instant::now();
     let device = Device::open()?;
     let opened = begin.elapsed();

@@ -1,11 +1,11 @@
 //! Tests: what goes wrong on a device comes back as an error that says what.
 
 use ndfmap_core::grid::Size;
-use ndfmap_core::ndf;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{self, Scene, SceneOptions};
 
 use crate::{Antialiasing, Canvas, Device, Geometry, GpuError, Lookups, Maps, Renderer, SceneView};
+use ndfmap_core::ndf::AnyMethod;
 
 /// A device with only some of the features we use; `None` skips, where the tests are not told to insist.
 fn device(features: wgpu::Features) -> Option<Device> {
@@ -29,7 +29,7 @@ const SMALL: Size = Size { width: 16, height: 16 };
 fn a_map_that_is_too_large_is_named() {
     let Some(device) = device(wgpu::Features::empty()) else { return };
     let scene = foil(Size { width: 40_000, height: 1 });
-    let method = ndf::parse("naive").unwrap();
+    let method = "naive".parse::<AnyMethod>().unwrap();
     let failed = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).err().unwrap();
     assert!(matches!(failed, GpuError::TooLarge { width: 40_000, .. }), "{failed}");
     let said = failed.to_string();
@@ -41,7 +41,7 @@ fn a_map_that_is_too_large_is_named() {
 #[test]
 fn without_filtering_of_floats_half_floats_are_asked_for() {
     let Some(device) = device(wgpu::Features::empty()) else { return };
-    let (scene, method) = (foil(SMALL), ndf::parse("naive").unwrap());
+    let (scene, method) = (foil(SMALL), "naive".parse::<AnyMethod>().unwrap());
     let with = |precision| Maps::new(&device, &scene.materials, &*method, precision, &|_| ());
     let failed = with(Precision::Single).err().unwrap();
     assert!(matches!(failed, GpuError::Unsupported { .. }));
@@ -56,7 +56,7 @@ fn without_filtering_of_floats_half_floats_are_asked_for() {
 fn frames_are_timed_with_and_without_a_clock_on_the_device() {
     for features in [wgpu::Features::empty(), wgpu::Features::TIMESTAMP_QUERY] {
         let Some(device) = device(features) else { return };
-        let (scene, method) = (foil(SMALL), ndf::parse("naive").unwrap());
+        let (scene, method) = (foil(SMALL), "naive".parse::<AnyMethod>().unwrap());
         let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
         let geometry = Geometry::new(&device, &scene).unwrap();
         let shown = SceneView { scene: &scene, geometry: &geometry, camera: &scene.camera };
@@ -70,7 +70,7 @@ fn frames_are_timed_with_and_without_a_clock_on_the_device() {
 #[test]
 fn a_lost_device_is_an_error() {
     let Some(device) = device(wgpu::Features::empty()) else { return };
-    let (scene, method) = (foil(SMALL), ndf::parse("naive").unwrap());
+    let (scene, method) = (foil(SMALL), "naive".parse::<AnyMethod>().unwrap());
     let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
     let geometry = Geometry::new(&device, &scene).unwrap();
     let renderer = Renderer::new(&device).unwrap();

@@ -103,7 +103,7 @@ impl<'a> Pipelines<'a> {
         outlines: Antialiasing,
     ) -> Result<Arc<wgpu::RenderPipeline>, GpuError> {
         let key =
-            Key::Draw(method.spelling(), lobe.shader().into_owned(), attributes, entry, outlines.samples());
+            Key::Draw(method.to_string(), lobe.shader().into_owned(), attributes, entry, outlines.samples());
         self.get(key, || {
             let text = link::draw(method, lobe, attributes)?.text;
             let targets = [outlines.format()];

@@ -13,6 +13,7 @@ use crate::canvas::Canvas;
 use crate::geometry::Geometry;
 use crate::maps::Textures;
 use crate::renderer::Sampling;
+use ndfmap_core::shader::LobeTable;
 
 /// `View` in `scene.wgsl`.
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -128,7 +129,7 @@ pub(crate) fn material(
     let (least, most) = textures.roughness.unwrap_or((params.roughness, params.roughness));
     four([f(brdf.lobe.base()), shading, u32::from(at_means).to_le_bytes(), f(least.get())]);
     four([f(most.get() - least.get()), [0; 4], [0; 4], [0; 4]]);
-    let table = method.map_or_else(|| vec![[0.0; 12]], |method| method.shader_table(brdf, least, most));
-    table.as_flattened().as_chunks::<4>().0.iter().for_each(|entry| four(entry.map(f32::to_le_bytes)));
+    let table = method.map_or_else(|| LobeTable::new(1), |method| method.shader_table(brdf, least, most));
+    table.as_flat().as_chunks::<4>().0.iter().for_each(|entry| four(entry.map(f32::to_le_bytes)));
     bytes
 }

@@ -5,7 +5,8 @@
 use std::path::Path;
 use std::process::Command;
 
-use ndfmap_core::brdf::{Brdf, ShadingModel};
+use ndfmap_core::brdf::{AnyLobe, Brdf, ShadingModel};
+use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::{brdf, ndf};
 use ndfmap_gpu::export::{Export, TABLE};
 
@@ -34,9 +35,9 @@ fn all(language: &str) -> Vec<(String, Vec<u8>)> {
     for (at, spelling) in ndf::TABLE.iter().flat_map(|row| row.samples).enumerate() {
         // Every lobe and model comes up, though not with every method.
         let lobes: Vec<&str> = brdf::TABLE.iter().map(|row| row.samples[0]).collect();
-        let lobe = brdf::parse(lobes[at % lobes.len()]).unwrap();
+        let lobe = lobes[at % lobes.len()].parse::<AnyLobe>().unwrap();
         let brdf = Brdf { lobe, shading: ShadingModel::ALL[at % ShadingModel::ALL.len()] };
-        let method = ndf::parse(spelling).unwrap();
+        let method = spelling.parse::<AnyMethod>().unwrap();
         let export = Export { method: &*method, brdf: &brdf };
         let bytes = export.to(language).unwrap_or_else(|e| panic!("{spelling}: {e}"));
         shaders.push((format!("{at}"), bytes));

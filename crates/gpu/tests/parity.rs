@@ -12,10 +12,10 @@ mod common;
 use common::device;
 use glam::{DVec3, Mat2, Vec3};
 use ndfmap_core::bake::Bake;
-use ndfmap_core::brdf::{Brdf, Directions, ShadingModel, SurfaceParams};
+use ndfmap_core::brdf::{AnyLobe, Brdf, Directions, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::Size;
 use ndfmap_core::lookup::Lookup;
-use ndfmap_core::ndf::{self, FilteredTexel, IncidentLight, Method};
+use ndfmap_core::ndf::{self, AnyMethod, FilteredTexel, IncidentLight, Method};
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::units::SlopeVariance;
 use ndfmap_core::{brdf, procedural, shader};
@@ -115,13 +115,13 @@ impl Question<'_> {
         out.extend(probe.wo.extend(0.0).to_array());
         out.extend(probe.normal.extend(0.0).to_array());
         out.extend(probe.by.to_cols_array());
-        out.extend(table.as_flattened());
+        out.extend(table.as_flat());
         out.extend(&probe.channels);
     }
 
     /// -1 where the base of the displaced surface turns its back on the eye, as only methods that know of displacement can take.
     fn side(&self, probe: &Probe) -> f32 {
-        if self.method.shader().displaces && probe.below { -1.0 } else { 1.0 }
+        if self.method.knows_displacement() && probe.below { -1.0 } else { 1.0 }
     }
 
     /// The twelve numbers by the CPU.
@@ -137,17 +137,15 @@ impl Question<'_> {
             at_means: *at_means,
             slope_map: None,
         };
-        let light = self
-            .method
-            .reflect(&texel, self.brdf, &[IncidentLight { directions, irradiance: DVec3::ONE }])
-            .to_array();
+        let light =
+            self.method.reflect(&texel, &[IncidentLight { directions, irradiance: DVec3::ONE }]).to_array();
         let eye = directions.wo * DVec3::new(1.0, 1.0, self.side(probe).into());
         let texel = FilteredTexel { slope_map: Some(by.as_dmat2()), ..texel };
         let lit = IncidentLight {
             directions: Directions::between(directions.wi, eye).unwrap(),
             irradiance: DVec3::ONE,
         };
-        let slope_map = self.method.reflect(&texel, self.brdf, &[lit]).to_array();
+        let slope_map = self.method.reflect(&texel, &[lit]).to_array();
         // Within four deviations: beyond, what is left is nothing to what the artificial normal brings.
         let visible = lobe.visible_area(eye.z, 0.3 + params.roughness.get());
         let facet = self.brdf.facet(normal.as_dvec3(), params, &directions).x;
@@ -156,7 +154,7 @@ impl Question<'_> {
         let of_lobe = |v: f64| if specular { v } else { 0.0 };
         let masking = if specular { lobe.masking(directions.wo.z, width) } else { 1.0 };
         let lambert = brdf::Lambert::SHARP;
-        use brdf::Lobe;
+        use brdf::Widen;
         [
             light[0],
             light[1],
@@ -165,7 +163,7 @@ impl Question<'_> {
             of_lobe(lobe.evaluate_widened(params.roughness, normal.z.into())),
             of_lobe(width.get()),
             masking,
-            lambert.evaluate_widened(params.roughness, directions.wi.z),
+            lambert.value_widened(params.roughness, directions.wi.z),
             slope_map[0],
             slope_map[1],
             slope_map[2],
@@ -229,12 +227,8 @@ const OUTPUTS: usize = 12;
 
 /// Compares; returns the share of outputs within [`RELATIVE`] without the second allowance.
 fn compare(device: &Device, question: &Question<'_>, probes: &[Probe]) -> f64 {
-    let name = format!(
-        "{} with {} and {}",
-        question.method.spelling(),
-        question.brdf.lobe.spelling(),
-        question.brdf.shading.name()
-    );
+    let name =
+        format!("{} with {} and {}", question.method, question.brdf.lobe, question.brdf.shading.name());
     let text = shader::link(question.method, &*question.brdf.lobe, 0) + include_str!("parity.wgsl");
     let mut input = Vec::new();
     probes.iter().for_each(|p| question.pack(p, &mut input));
@@ -271,14 +265,14 @@ fn compare(device: &Device, question: &Question<'_>, probes: &[Probe]) -> f64 {
 }
 
 fn brdf(lobe: &str, shading: ShadingModel) -> Brdf {
-    Brdf { lobe: brdf::parse(lobe).unwrap(), shading }
+    Brdf { lobe: lobe.parse::<AnyLobe>().unwrap(), shading }
 }
 
 #[test]
 fn every_method_agrees() {
     let Some(device) = device() else { return };
     for (at, spelling) in ndf::TABLE.iter().flat_map(|row| row.samples).enumerate() {
-        let method = ndf::parse(spelling).unwrap();
+        let method = spelling.parse::<AnyMethod>().unwrap();
         let probes = probes(&*method, 500);
         for (k, lobe) in ["blinn-phong:50", "ggx:0.2"].into_iter().enumerate() {
             let brdf = brdf(lobe, ShadingModel::ALL[(at + k) % ShadingModel::ALL.len()]);
@@ -291,7 +285,7 @@ fn every_method_agrees() {
 #[test]
 fn every_lobe_agrees_in_every_model() {
     let Some(device) = device() else { return };
-    let method = ndf::parse("vmf:4").unwrap();
+    let method = "vmf:4".parse::<AnyMethod>().unwrap();
     let probes = probes(&*method, 2000);
     for spelling in brdf::TABLE.iter().flat_map(|row| row.samples) {
         for shading in ShadingModel::ALL {
@@ -306,18 +300,13 @@ fn every_lobe_agrees_in_every_model() {
 fn displaced_surfaces_agree() {
     let Some(device) = device() else { return };
     for method in ["slopes", "slopes:9"] {
-        let method = ndf::parse(method).unwrap();
+        let method = method.parse::<AnyMethod>().unwrap();
         let probes = probes(&*method, 2000);
         for lobe in ["beckmann:0.05", "beckmann:0.4", "ggx:0.2", "lambert"] {
             for shading in [ShadingModel::Masked, ShadingModel::Shadowed] {
                 let brdf = brdf(lobe, shading);
                 let share = compare(&device, &Question { method: &*method, brdf: &brdf }, &probes);
-                eprintln!(
-                    "{} {lobe} {}: {:.2} % within 1e-5",
-                    method.spelling(),
-                    shading.name(),
-                    100.0 * share
-                );
+                eprintln!("{} {lobe} {}: {:.2} % within 1e-5", method, shading.name(), 100.0 * share);
             }
         }
     }

@@ -5,10 +5,12 @@
 mod common;
 
 use common::device;
+use ndfmap_core::brdf::AnyLobe;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::environment::{SceneEnvironment, Technique, builtin};
 use ndfmap_core::lookup::Filtering;
 use ndfmap_core::metrics::{Picture, display, relative_l2};
+use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{self, Scene, SceneOptions, SurfaceTextures};
 use ndfmap_core::{brdf, ndf};
@@ -49,7 +51,7 @@ fn every_method_draws_what_the_cpu_draws() {
     let methods = methods.copied().chain(["ndm:plane", "sh:7", "vmf:4:unaligned", "gmm:4:prior"]);
     let mut failed = Vec::new();
     for spelling in methods {
-        let method = ndf::parse(spelling).unwrap();
+        let method = spelling.parse::<AnyMethod>().unwrap();
         for (name, scene) in &scenes {
             let ours = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
             let theirs = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
@@ -82,7 +84,7 @@ fn the_truth_is_the_truth() {
     let (renderer, size) = (Renderer::new(&device).unwrap(), Size { width: 120, height: 100 });
     let sharp = Canvas::new(&device, size, Antialiasing::Sharp).unwrap();
     let parts = Canvas::new(&device, size, Antialiasing::Parts).unwrap();
-    let method = ndf::parse("vmf:4").unwrap();
+    let method = "vmf:4".parse::<AnyMethod>().unwrap();
     for (name, time) in [("disk", 0.2), ("armour", 0.5), ("v-groove", 0.5)] {
         let scene = staged(name, time, 128);
         let on_gpu = Geometry::new(&device, &scene).unwrap();
@@ -132,7 +134,7 @@ fn the_sampler_is_near_our_taps() {
     let Some(device) = device() else { return };
     let (renderer, size) = (Renderer::new(&device).unwrap(), Size { width: 200, height: 200 });
     let scene = staged("disk", 0.3, 256);
-    let method = ndf::parse("vmf:4").unwrap();
+    let method = "vmf:4".parse::<AnyMethod>().unwrap();
     let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
     let geometry = Geometry::new(&device, &scene).unwrap();
     let shown = SceneView { scene: &scene, geometry: &geometry, camera: &scene.camera };
@@ -171,7 +173,7 @@ fn colours_and_gloss_of_maps_are_drawn_too() {
     let filtering = Filtering::anisotropic(4);
     for spelling in ["vmf:2", "gmm:3", "slopes", "toksvig", "ndm", "ndm:gaussian", "phong:1", "sh:4", "sh:7"]
     {
-        let method = ndf::parse(spelling).unwrap();
+        let method = spelling.parse::<AnyMethod>().unwrap();
         let ours = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
         let lookups = Lookups { sampling: Sampling::Taps(filtering), neighbours: false, at_means: false };
         renderer.draw(&canvas, &shown, &ours, lookups).unwrap();
@@ -201,7 +203,7 @@ fn displaced_scenes_are_the_cpus() {
         assert_eq!(on_gpu.len(), on_cpu.len(), "{name}");
         let shown = SceneView { scene: &scene, geometry: &on_gpu, camera: &scene.camera };
         for spelling in ["slopes", "vmf:4"] {
-            let method = ndf::parse(spelling).unwrap();
+            let method = spelling.parse::<AnyMethod>().unwrap();
             let ours = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
             let theirs = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
             let traced = Filtered { scene: &scene, geometry: &on_cpu, maps: &theirs, progress: &|_| () };
@@ -223,7 +225,7 @@ fn displaced_scenes_are_the_cpus() {
 
 /// The shares of pixels that are off, of a scene by a method on both devices.
 fn off_by(device: &ndfmap_gpu::Device, scene: &Scene, spelling: &str, size: Size) -> f64 {
-    let (renderer, method) = (Renderer::new(device).unwrap(), ndf::parse(spelling).unwrap());
+    let (renderer, method) = (Renderer::new(device).unwrap(), spelling.parse::<AnyMethod>().unwrap());
     let canvas = Canvas::new(device, size, Antialiasing::Parts).unwrap();
     let ours = Maps::new(device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
     let theirs = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
@@ -278,7 +280,7 @@ fn every_lobe_is_lit_by_environments_as_on_the_cpu() {
     for (at, lobe) in brdf::TABLE.iter().map(|row| row.samples[0]).enumerate() {
         for spelling in ["vmf:4", "slopes"] {
             let mut scene = surrounded(staged("sphere", 0.0, 128), "studio", Technique::ALL[at % 2]);
-            scene.set_brdf(&*brdf::parse(lobe).unwrap());
+            scene.set_brdf(&*lobe.parse::<AnyLobe>().unwrap());
             let share = off_by(&device, &scene, spelling, size);
             eprintln!("{spelling} {lobe}: {share:.5} off");
             if share > 2.0 * MAY_DIFFER {

@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
 
+use ndfmap_core::brdf::AnyLobe;
+use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::{brdf, ndf};
 use ndfmap_gpu::link;
 
@@ -9,10 +11,10 @@ use ndfmap_gpu::link;
 fn every_link_is_valid() {
     let mut links = 0;
     for row in brdf::TABLE {
-        let lobe = brdf::parse(row.samples[0]).unwrap();
+        let lobe = row.samples[0].parse::<AnyLobe>().unwrap();
         link::truth(&*lobe).unwrap_or_else(|e| panic!("{}: {e}", row.name));
         for spelling in ndf::TABLE.iter().flat_map(|row| row.samples) {
-            let method = ndf::parse(spelling).unwrap();
+            let method = spelling.parse::<AnyMethod>().unwrap();
             let carried = if method.fit().is_some() { 0..=2 } else { 0..=0 };
             for attributes in carried {
                 link::draw(&*method, &*lobe, attributes).unwrap_or_else(|e| panic!("{spelling}: {e}"));

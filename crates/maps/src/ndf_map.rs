@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use ndfmap_core::ndf::{self, Method};
 use ndfmap_core::pyramid::{Layout, Precision, Pyramid};
 
 use crate::image::check_size;
 use crate::{Header, MapError};
+use ndfmap_core::ndf::AnyMethod;
 
 /// A normal distribution map.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,7 +22,7 @@ impl NdfMap {
     ///
     /// # Errors
     /// [`MapError`] when the header names none.
-    pub fn method(&self, path: &Path) -> Result<Box<dyn Method>, MapError> {
+    pub fn method(&self, path: &Path) -> Result<AnyMethod, MapError> {
         method_of(path, &self.header)
     }
 
@@ -42,8 +42,8 @@ impl NdfMap {
 /// Attributes that a map may carry.
 pub const MAX_ATTRIBUTES: usize = 15;
 
-fn method_of(path: &Path, header: &Header) -> Result<Box<dyn Method>, MapError> {
-    ndf::parse(&header.method).map_err(|e| MapError::unsupported(path, e))
+fn method_of(path: &Path, header: &Header) -> Result<AnyMethod, MapError> {
+    header.method.parse::<AnyMethod>().map_err(|e| MapError::unsupported(path, e))
 }
 
 /// The layout that a header promises.
@@ -51,10 +51,10 @@ pub(crate) fn layout_of(path: &Path, header: &Header, precision: Precision) -> R
     let size = check_size(path, header.width, header.height)?;
     let method = method_of(path, header)?;
     let carried = header.attributes.len();
-    if carried > 0 && method.fit().is_none() || carried > MAX_ATTRIBUTES {
+    if carried > 0 && !method.carries_attributes() || carried > MAX_ATTRIBUTES {
         let reason = format!("says that `{}` carries {carried} attributes", header.method);
         return Err(MapError::invalid(path, reason));
     }
-    let layers = method.layers() * (1 + carried);
+    let layers = method.layers_with(carried);
     Ok(Layout { size, layers, precision, wraps: header.wraps(path)? })
 }

@@ -9,6 +9,7 @@ mod common;
 use std::path::Path;
 
 use common::{baked, pictures};
+use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_maps::formats::exr::{write_bumpslopes, write_native};
 use ndfmap_maps::formats::ktx2::write_compressed;
@@ -44,7 +45,7 @@ fn ktx2() -> Vec<u8> {
         ..Default::default()
     };
     let map = read_source("builtin:armour".as_ref(), &options).unwrap();
-    let method = ndfmap_core::ndf::parse("slopes").unwrap();
+    let method = "slopes".parse::<AnyMethod>().unwrap();
     let bake =
         Bake { surface: &*map.surface, method: &*method, precision: Precision::Half, progress: &|_| () };
     let header = baked("slopes", "armour", Precision::Half).header;

@@ -6,11 +6,13 @@
 use std::time::Instant;
 
 use ndfmap_core::bake::{Bake, MemorySink};
+use ndfmap_core::brdf::AnyLobe;
 use ndfmap_core::grid::Size;
 use ndfmap_core::measure::{TexelTruth, lattice_for, level_error, true_levels};
+use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::procedural;
 use ndfmap_core::pyramid::{Layout, Precision, level_sizes};
 use ndfmap_core::surface::{Surface, SurfaceRow, Wraps};
-use ndfmap_core::{brdf, ndf, procedural};
 use ndfmap_maps::source::{SourceOptions, source_of_image};
 use ndfmap_maps::{Image, Samples};
 
@@ -48,11 +50,11 @@ fn timed(work: impl FnOnce()) -> f64 {
 /// Error at level 4 of the same surface at 512², blinn-phong:50.
 fn error(spelling: &str) -> Result<f64, Box<dyn std::error::Error>> {
     let surface = (procedural::find("foil").ok_or("no foil")?.build)(Size::new(512, 512)?);
-    let lobe = brdf::parse("blinn-phong:50")?;
+    let lobe = "blinn-phong:50".parse::<AnyLobe>()?;
     let lattice = lattice_for(&*lobe);
     let truth = TexelTruth::new(&*surface, &*lobe, &lattice);
     let level = true_levels(&truth, &|_| ()).swap_remove(4);
-    let method = ndf::parse(spelling)?;
+    let method = spelling.parse::<AnyMethod>()?;
     let bake = Bake { surface: &*surface, method: &*method, precision: Precision::Half, progress: &|_| () };
     Ok(level_error(&bake.to_pyramid().0, &*method, &*lobe, &lattice, &level))
 }
@@ -76,7 +78,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "method", "copy ms", "bake ms", "ratio", "ns/texel", "error"
     );
     for spelling in METHODS {
-        let method = ndf::parse(spelling)?;
+        let method = spelling.parse::<AnyMethod>()?;
         let surface: &dyn Surface = &*map.surface;
         let bake = Bake { surface, method: &*method, precision: Precision::Half, progress: &|_| () };
         let layout =

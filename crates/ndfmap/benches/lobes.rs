@@ -8,11 +8,12 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use ndfmap_core::bake::{Bake, MemorySink};
+use ndfmap_core::brdf::AnyLobe;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::measure::{FilteringError, TexelTruth, filtering_error, lattice_for, true_corners};
+use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::surface::{NormalGrid, Surface, SurfaceRow};
-use ndfmap_core::{brdf, ndf};
 use ndfmap_maps::source::{SourceOptions, read_source};
 
 /// Measured against the first.
@@ -93,7 +94,7 @@ fn time(largest: usize, turns: usize) -> Result<(), Box<dyn std::error::Error>> 
             if side > 1024 && spelling.ends_with("unaligned") {
                 continue;
             }
-            let method = ndf::parse(spelling)?;
+            let method = spelling.parse::<AnyMethod>()?;
             let bake =
                 Bake { surface: &surface, method: &*method, precision: Precision::Half, progress: &|_| () };
             let mut sink = MemorySink::new(bake.layout());
@@ -118,7 +119,7 @@ fn measure(map: &Path) -> Result<Vec<Vec<Vec<FilteringError>>>, Box<dyn std::err
     let surface = load(map, MOST.min(setting("NDFMAP_BENCH_SIZE", MOST)))?;
     let mut truths = Vec::new();
     for lobe in LOBES {
-        let lobe = brdf::parse(lobe)?;
+        let lobe = lobe.parse::<AnyLobe>()?;
         let lattice = lattice_for(&*lobe);
         let corners =
             true_corners(&TexelTruth::new(&surface, &*lobe, &lattice), surface.wraps(), &LEVELS, &|_| ());
@@ -126,7 +127,7 @@ fn measure(map: &Path) -> Result<Vec<Vec<Vec<FilteringError>>>, Box<dyn std::err
     }
     let mut all = Vec::new();
     for spelling in METHODS {
-        let method = ndf::parse(spelling)?;
+        let method = spelling.parse::<AnyMethod>()?;
         let bake =
             Bake { surface: &surface, method: &*method, precision: Precision::Half, progress: &|_| () };
         let (pyramid, _) = bake.to_pyramid();

@@ -9,7 +9,7 @@ use std::time::Instant;
 use ndfmap_core::grid::Size;
 use ndfmap_core::lookup::Filtering;
 use ndfmap_core::metrics::{color_error, relative_l2};
-use ndfmap_core::ndf;
+use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{self, Scene, SceneOptions};
 use ndfmap_trace::Geometry;
@@ -70,7 +70,7 @@ fn costs(name: &str, time: f64, side: usize, runs: usize) -> Result<(), Box<dyn 
         "method", "filter", "ms", "truth / this", "color_error", "relative_l2"
     );
     for spelling in METHODS {
-        let method = ndf::parse(spelling)?;
+        let method = spelling.parse::<AnyMethod>()?;
         let maps = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
         let filtered = Filtered { scene: &scene, geometry: &geometry, maps: &maps, progress: &|_| () };
         for (filter, filtering) in FILTERS {
@@ -92,7 +92,7 @@ fn costs(name: &str, time: f64, side: usize, runs: usize) -> Result<(), Box<dyn 
 
 fn scaling(side: usize, runs: usize) -> Result<(), Box<dyn std::error::Error>> {
     println!("\nplane by vmf:4, fine:16: milliseconds, and nanoseconds a pixel");
-    let method = ndf::parse("vmf:4")?;
+    let method = "vmf:4".parse::<AnyMethod>()?;
     for map in [256, 512, 1024] {
         let scene = scene("plane", 0.0, map)?;
         let geometry = Geometry::new(&scene);

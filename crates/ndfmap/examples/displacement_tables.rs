@@ -10,11 +10,10 @@
 use std::path::Path;
 
 use glam::DVec3;
-use ndfmap::core::brdf::{self, Lambert};
+use ndfmap::core::brdf::{AnyLobe, Lambert};
 use ndfmap::core::grid::{Grid, Size};
 use ndfmap::core::light::environment::{SceneEnvironment, builtin};
 use ndfmap::core::metrics::{Picture, relative_l2};
-use ndfmap::core::ndf;
 use ndfmap::core::pyramid::Precision;
 use ndfmap::core::scene::{self, Scene, SceneOptions};
 use ndfmap::maps::picture::write_picture;
@@ -23,6 +22,7 @@ use ndfmap::trace::truth::{Effort, Truth};
 use ndfmap::trace::{DisplacedMeshes, Geometry};
 
 use ndfmap::core::lookup::Filtering;
+use ndfmap_core::ndf::AnyMethod;
 
 /// What the spheres are made of, and what lights them.
 #[derive(Clone, Copy, PartialEq)]
@@ -88,7 +88,7 @@ fn scene_of(plan: &Plan, table: &Table, deviation: f64) -> Result<Scene, Box<dyn
     let row = scene::find(table.scene).ok_or("no such scene")?;
     let mut scene = (row.build)(&plan.staging);
     if table.case == Case::Mirror {
-        scene.set_brdf(&*brdf::parse(MIRROR)?);
+        scene.set_brdf(&*MIRROR.parse::<AnyLobe>()?);
         scene.materials[0].params.diffuse = DVec3::ZERO;
         scene.materials[0].params.specular = DVec3::ONE;
     } else {
@@ -121,7 +121,7 @@ fn pictures(
     let mut all = vec![normal_map, truth.picture];
     let geometry = Geometry::displaced(scene, &scene.camera, plan.size);
     for spelling in methods {
-        let method = ndf::parse(spelling)?;
+        let method = spelling.parse::<AnyMethod>()?;
         let maps = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
         let filtered = Filtered { scene, geometry: &geometry, maps: &maps, progress: &|_| () };
         let lookups = Lookups { filtering: Filtering::fine(16), ..Lookups::TRILINEAR };

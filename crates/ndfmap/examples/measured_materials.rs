@@ -5,13 +5,14 @@
 use std::path::PathBuf;
 
 use ndfmap::core::bake::Bake;
+use ndfmap::core::brdf::AnyLobe;
 use ndfmap::core::grid::Size;
 use ndfmap::core::measure::TexelTruth;
 use ndfmap::core::pyramid::Precision;
 use ndfmap::core::sphere::DiskLattice;
 use ndfmap::core::surface::{SlopeFilter, Wraps};
-use ndfmap::core::{brdf, ndf};
 use ndfmap::maps::source::{Convention, DEFAULT_HEIGHT_SCALE, SourceOptions, read_source};
+use ndfmap_core::ndf::AnyMethod;
 use rayon::prelude::*;
 
 /// From matte to shiny.
@@ -47,8 +48,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let source = read_source(&map, &options)?;
     let lattice = DiskLattice::new(64, 0.97);
-    let methods =
-        ["toksvig", "sh:7", "sh:16", "vmf:4", "vmf:6"].map(|m| ndf::parse(m).map_err(|e| e.to_string()));
+    let methods = ["toksvig", "sh:7", "sh:16", "vmf:4", "vmf:6"]
+        .map(|m| m.parse::<AnyMethod>().map_err(|e| e.to_string()));
     let methods = methods.into_iter().collect::<Result<Vec<_>, _>>()?;
     let mut pyramids = Vec::new();
     for method in &methods {
@@ -63,10 +64,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("level {LEVEL} of {}; errors are relative L2 over half-vectors, of f alone", map.display());
     println!(
         "material                 width  kernels  factors     lobe  {}",
-        methods.iter().map(|m| format!("{:>8}", m.spelling())).collect::<String>()
+        methods.iter().map(|m| format!("{:>8}", m.to_string())).collect::<String>()
     );
     for material in MATERIALS {
-        let lobe = brdf::parse(&format!("sgd:{material}"))?;
+        let lobe = format!("sgd:{material}").parse::<AnyLobe>()?;
         let factors = lobe.measured().ok_or("a measured lobe")?;
         let degrees = lobe.slope_variance().map_or(0.0, |v| v.get().sqrt().to_degrees());
         print!(

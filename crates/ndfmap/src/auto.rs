@@ -6,7 +6,6 @@
 use ndfmap_core::bake::Bake;
 use ndfmap_core::brdf::Lobe;
 use ndfmap_core::measure::{TexelTruth, filtering_error, lattice_for, true_corners};
-use ndfmap_core::ndf;
 use ndfmap_core::pyramid::{Precision, level_sizes};
 use ndfmap_core::surface::Surface;
 use serde_json::{Value, json};
@@ -14,6 +13,7 @@ use serde_json::{Value, json};
 use crate::Failure;
 use crate::measure::three_digits;
 use crate::progress::Progress;
+use ndfmap_core::ndf::AnyMethod;
 
 /// The spelling that asks for a choice.
 pub(crate) const AUTO: &str = "auto";
@@ -89,7 +89,7 @@ impl Auto<'_> {
         };
         let mut candidates = Vec::new();
         for spelling in CANDIDATES {
-            let method = ndf::parse(spelling).map_err(|e| Failure::Failed(e.to_string()))?;
+            let method = spelling.parse::<AnyMethod>().map_err(|e| Failure::Failed(e.to_string()))?;
             let bytes = method.layers() * self.precision.texel_bytes();
             if self.lobes_only && method.fit().is_none()
                 || matches!(limit, Limit::Bytes(most) if bytes > most)
@@ -113,7 +113,7 @@ impl Auto<'_> {
         });
         let (chosen, why) = pick(&candidates, limit)?;
         let method = candidates[chosen].method.clone();
-        Ok(Choice { method, why, levels, lobe: self.lobe.spelling(), candidates })
+        Ok(Choice { method, why, levels, lobe: self.lobe.to_string(), candidates })
     }
 }
 

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use ndfmap_core::grid::Size;
 use ndfmap_core::metrics::{Picture, change, color_error, relative_l2};
-use ndfmap_core::ndf::Method;
+use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::Scene;
 use ndfmap_trace::filtered::Lookups;
@@ -22,7 +22,7 @@ pub(crate) struct RenderJob<'a> {
     pub(crate) stage: &'a SceneSpec,
     /// Times of the frames, at least one.
     pub(crate) times: &'a [f64],
-    pub(crate) methods: &'a [Box<dyn Method>],
+    pub(crate) methods: &'a [AnyMethod],
     pub(crate) size: Size,
     pub(crate) precision: Precision,
     pub(crate) lookups: Lookups,
@@ -93,7 +93,7 @@ pub(crate) fn shoot<E: Engine>(
     let first = shot.stage.set(shot.times[0])?;
     for method in shot.methods {
         let start = Instant::now();
-        let progress = Progress::new(&format!("bake {}", method.spelling()));
+        let progress = Progress::new(&format!("bake {}", method));
         baked.push(engine.bake(&first.materials, &**method, shot.precision, &|f| progress.set(f))?);
         bake_seconds.push(start.elapsed().as_secs_f64());
     }
@@ -110,7 +110,7 @@ pub(crate) fn shoot<E: Engine>(
         }
         frames.push(frame);
     }
-    let methods = shot.methods.iter().map(|m| m.spelling()).collect();
+    let methods = shot.methods.iter().map(|m| m.to_string()).collect();
     Ok(RenderReport { frames, methods, bake_seconds, engine: engine.describe() })
 }
 

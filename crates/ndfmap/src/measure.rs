@@ -8,18 +8,18 @@ use ndfmap_core::grid::Size;
 use ndfmap_core::measure::{
     FilteringError, TexelTruth, filtering_error, lattice_for, level_error, true_corners, true_levels,
 };
-use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid::{Precision, Pyramid, level_sizes};
 use ndfmap_core::surface::Surface;
 use serde_json::{Map, Value, json};
 
 use crate::progress::Progress;
+use ndfmap_core::ndf::AnyMethod;
 
 /// What is compared.
 pub(crate) struct Subject<'a> {
     pub(crate) surface: &'a dyn Surface,
     pub(crate) lobe: &'a dyn Lobe,
-    pub(crate) methods: &'a [Box<dyn Method>],
+    pub(crate) methods: &'a [AnyMethod],
     pub(crate) precision: Precision,
     /// Measure between texels too.
     pub(crate) filtering: bool,
@@ -64,7 +64,7 @@ pub(crate) fn compare(subject: &Subject<'_>) -> Comparison {
     };
     let mut rows = Vec::new();
     for method in subject.methods {
-        let progress = Progress::new(&method.spelling());
+        let progress = Progress::new(&method.to_string());
         let start = Instant::now();
         let bake = Bake {
             surface: subject.surface,
@@ -80,7 +80,7 @@ pub(crate) fn compare(subject: &Subject<'_>) -> Comparison {
         let filtering = corners.iter().map(between).collect();
         let bytes_per_texel = method.layers() * subject.precision.texel_bytes();
         rows.push(Row {
-            method: method.spelling(),
+            method: method.to_string(),
             bytes_per_texel,
             bake_seconds,
             pyramid,
@@ -88,7 +88,7 @@ pub(crate) fn compare(subject: &Subject<'_>) -> Comparison {
             filtering,
         });
     }
-    Comparison { lobe: subject.lobe.spelling(), sizes, rows }
+    Comparison { lobe: subject.lobe.to_string(), sizes, rows }
 }
 
 impl Comparison {

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec3;
-use ndfmap_core::brdf::{Lobe, ShadingModel};
+use ndfmap_core::brdf::{AnyLobe, ShadingModel};
 use ndfmap_core::grid::Size;
 use ndfmap_core::light::Light;
 use ndfmap_core::light::environment::SceneEnvironment;
@@ -23,7 +23,7 @@ pub(crate) struct SceneSpec {
     pub(crate) map: Option<Arc<dyn Surface>>,
     /// Size of built-in maps.
     pub(crate) map_size: Option<Size>,
-    pub(crate) lobe: Option<Arc<dyn Lobe>>,
+    pub(crate) lobe: Option<AnyLobe>,
     pub(crate) shading: Option<ShadingModel>,
     pub(crate) camera: Option<CameraArgument>,
     pub(crate) lights: Vec<Light>,
@@ -108,7 +108,7 @@ impl SceneSpec {
         if let Some(DisplacementOptions { scale, shadows }) = self.displacement {
             if let Some(measured) = self.lobe.as_ref().filter(|lobe| lobe.measured().is_some()) {
                 let why = "a measured lobe is none of microfacets, which displaced surfaces are made of";
-                return Err(Failure::Usage(format!("--displace: {}: {why}", measured.spelling())));
+                return Err(Failure::Usage(format!("--displace: {}: {why}", measured)));
             }
             scene.displace(scale, shadows).map_err(|e| {
                 Failure::Usage(format!("--displace {}: {e}; name one with `--map`", self.scene))

@@ -7,17 +7,17 @@ use std::sync::Arc;
 
 use glam::{DMat2, DVec2, DVec3, Vec3};
 use ndfmap_core::bake::Bake;
-use ndfmap_core::brdf::{Brdf, Directions, ShadingModel, SurfaceParams};
+use ndfmap_core::brdf::{AnyLobe, Brdf, Directions, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
 use ndfmap_core::lookup::Filtering;
 use ndfmap_core::metrics::Picture;
-use ndfmap_core::ndf::{self, FilteredTexel, IncidentLight, Method};
+use ndfmap_core::ndf::{AnyMethod, FilteredTexel, IncidentLight, Method};
+use ndfmap_core::procedural;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{self, Camera, Material, Mesh, Object, Scene, SceneOptions};
 use ndfmap_core::surface::{HeightField, SlopeFilter, Surface, Wraps};
 use ndfmap_core::units::SlopeVariance;
-use ndfmap_core::{brdf, procedural};
 use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
 use ndfmap_trace::truth::{Effort, Truth};
 use ndfmap_trace::{DisplacedMeshes, Geometry};
@@ -88,7 +88,7 @@ fn by_method(scene: &Scene, channels: &[f32], method: &dyn Method, wo: DVec3) ->
         Directions::between(wi, wo).map(|directions| IncidentLight { directions, irradiance })
     };
     let lights: Vec<IncidentLight> = scene.lights.iter().filter_map(lit).collect();
-    method.reflect(&texel, &material.brdf, &lights).x
+    method.reflect(&texel, &lights).x
 }
 
 /// The coarsest texel of a method's map.
@@ -171,18 +171,18 @@ fn lights(wi: DVec3) -> Vec<Light> {
 
 /// Relative L2 error of LEADR over all ways, diffuse and with this specular lobe, for slopes of these deviations.
 fn errors(deviations: DVec2, lobe: &str, surfaces: u64, rays: usize) -> [f64; 2] {
-    let method = ndf::parse("slopes:9").unwrap();
+    let method = "slopes:9".parse::<AnyMethod>().unwrap();
     let mut all =
         [vec![(0.0, 0.0); incident_directions().len()], vec![(0.0, 0.0); incident_directions().len()]];
     for seed in 0..surfaces {
-        let brdf = || Brdf { lobe: brdf::parse(lobe).unwrap(), shading: ShadingModel::Masked };
+        let brdf = || Brdf { lobe: lobe.parse::<AnyLobe>().unwrap(), shading: ShadingModel::Masked };
         let mut scene = plane(Arc::new(gaussian(deviations, seed)), brdf(), 0.0, &incident_directions()[0]);
         scene.displace(1.0, false).unwrap();
         let channels = coarsest(&*scene.materials[0].surface, &*method);
         let (geometry, displacement) = (Geometry::without_displacement(&scene), DisplacedMeshes::new(&scene));
         for (lobe, pairs) in ["lambert", lobe].into_iter().zip(&mut all) {
             let diffuse = if lobe == "lambert" { 1.0 } else { 0.0 };
-            scene.materials[0].brdf.lobe = brdf::parse(lobe).unwrap();
+            scene.materials[0].brdf.lobe = lobe.parse::<AnyLobe>().unwrap();
             scene.materials[0].params.diffuse = DVec3::splat(diffuse);
             for (directions, pair) in incident_directions().iter().zip(pairs) {
                 scene.lights = lights(directions.wi);
@@ -234,7 +234,7 @@ fn a_groove_displaced_is_its_two_flanks_as_seen() {
         (DVec3::new(1.0, 0.0, 0.9), DVec3::new(0.3, 0.2, 1.0)),
     ] {
         let directions = Directions::new(wi.normalize(), wo.normalize()).unwrap();
-        let brdf = || Brdf { lobe: brdf::parse("lambert").unwrap(), shading: ShadingModel::Masked };
+        let brdf = || Brdf { lobe: "lambert".parse::<AnyLobe>().unwrap(), shading: ShadingModel::Masked };
         let mut scene = plane(surface.clone(), brdf(), 0.8, &directions);
         scene.displace(1.0, false).unwrap();
         let flanks = [-0.5, 0.5].map(|x| DVec3::new(x, 0.0, 1.0));
@@ -260,7 +260,7 @@ fn shadows_take_what_the_relief_stands_before() {
     let elevation = 20_f64.to_radians();
     let wi = DVec3::new(elevation.cos(), 0.0, elevation.sin());
     let directions = Directions::new(wi, DVec3::new(1e-4, 0.0, 1.0).normalize()).unwrap();
-    let brdf = Brdf { lobe: brdf::parse("lambert").unwrap(), shading: ShadingModel::Shadowed };
+    let brdf = Brdf { lobe: "lambert".parse::<AnyLobe>().unwrap(), shading: ShadingModel::Shadowed };
     let mut scene = plane(Arc::new(surface), brdf, 0.8, &directions);
     scene.displace(1.0, true).unwrap();
     // A ridge of height 1/2 every 1, flanks of slope 1. Down the flank that faces the light from a ridge at 0 (height 1/2 - x), light comes
@@ -280,7 +280,7 @@ fn builtin_maps_have_the_slopes_that_are_displaced() {
             (procedural::find(name).unwrap().build)(Size { width: 256, height: 256 }).into();
         let directions =
             Directions::new(DVec3::new(0.4, 0.1, 1.0).normalize(), DVec3::new(1e-4, 0.0, 1.0).normalize());
-        let brdf = Brdf { lobe: brdf::parse("lambert").unwrap(), shading: ShadingModel::Masked };
+        let brdf = Brdf { lobe: "lambert".parse::<AnyLobe>().unwrap(), shading: ShadingModel::Masked };
         let mut scene = plane(surface, brdf, 1.0, &directions.unwrap());
         scene.displace(1.0, false).unwrap();
         let displacement = DisplacedMeshes::new(&scene);
@@ -297,7 +297,7 @@ fn builtin_maps_have_the_slopes_that_are_displaced() {
             let products = [slope.x * slope.x, slope.y * slope.y, slope.x * slope.y];
             second.iter_mut().zip(products).for_each(|(sum, p)| *sum += p / f64::from(count));
         }
-        let method = ndf::parse("slopes").unwrap();
+        let method = "slopes".parse::<AnyMethod>().unwrap();
         let texel = coarsest(&*scene.materials[0].surface, &*method);
         let scale = second[0] + second[1];
         // Twenty thousand slopes leave a percent; facets half a texel wide have 1/24 of the texel's own bend less than the surface.
@@ -320,8 +320,8 @@ fn silhouettes_are_defined_over_a_full_turn() {
     scene.displace(2.0, false).unwrap();
     scene.materials[0].params.diffuse = DVec3::ZERO;
     // Its tails are never too thin for a float.
-    scene.materials[0].brdf.lobe = brdf::parse("ggx:0.3").unwrap();
-    let method = ndf::parse("slopes").unwrap();
+    scene.materials[0].brdf.lobe = "ggx:0.3".parse::<AnyLobe>().unwrap();
+    let method = "slopes".parse::<AnyMethod>().unwrap();
     let maps = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
     let mut undefined = [0, 0];
     for rotation in 0..12 {
@@ -358,7 +358,7 @@ fn brightness_follows_the_truth_as_relief_becomes_roughness() {
         let staging = SceneOptions { time, map_size: Size { width: 256, height: 256 }, map: None };
         let mut scene = (scene::find("noise-sphere").unwrap().build)(&staging);
         scene.displace(1.0, false).unwrap();
-        let method = ndf::parse("slopes").unwrap();
+        let method = "slopes".parse::<AnyMethod>().unwrap();
         let maps = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
         let geometry = Geometry::displaced(&scene, &scene.camera, size);
         let filtered = Filtered { scene: &scene, geometry: &geometry, maps: &maps, progress: &|_| () };

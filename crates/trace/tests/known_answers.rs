@@ -14,6 +14,7 @@ use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
 use ndfmap_core::lookup::Filtering;
 use ndfmap_core::metrics::{Picture, relative_l2};
+use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{self, Camera, Mesh, Scene, SceneOptions, SurfaceTextures};
 use ndfmap_core::surface::{NormalGrid, Surface, SurfaceRow, Wraps};
@@ -261,13 +262,13 @@ fn every_method_shows_every_scene() {
         let scene = (row.build)(&staging);
         let geometry = Geometry::new(&scene);
         for method in ndf::TABLE {
-            let method = ndf::parse(method.samples[0]).unwrap();
+            let method = method.samples[0].parse::<AnyMethod>().unwrap();
             let maps = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
             let picture = Filtered { scene: &scene, geometry: &geometry, maps: &maps, progress: &|_| () }
                 .render(&scene.camera, size, lookups);
             let sound = picture.texels().iter().all(|p| p.is_finite() && p.min_element() >= 0.0);
             let bright = picture.texels().iter().any(|p| p.max_element() > 0.03);
-            assert!(sound && bright, "{} by {}", row.name, method.spelling());
+            assert!(sound && bright, "{} by {}", row.name, method);
         }
     }
 }

@@ -85,7 +85,7 @@ impl Bake<'_> {
     pub fn layout_with(&self, attributes: usize) -> Layout {
         Layout {
             size: self.surface.size(),
-            layers: self.method.layers() * (1 + attributes),
+            layers: self.method.layers_with(attributes),
             precision: self.precision,
             wraps: self.surface.wraps(),
         }

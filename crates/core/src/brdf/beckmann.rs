@@ -6,8 +6,9 @@
 
 use std::borrow::Cow;
 use std::f64::consts::PI;
+use std::fmt::{self, Display};
 
-use super::{Argument, Lobe, Microfacets, Row, number, twin};
+use super::{AnyLobe, Lobe, Microfacets, Row, Widen, number, twin};
 use crate::units::{Alpha, SlopeVariance};
 
 /// A Beckmann distribution of microfacets.
@@ -28,17 +29,13 @@ impl Beckmann {
     pub fn of_width(width: SlopeVariance) -> Self {
         Self { alpha_squared: 2.0 * width.get() }
     }
-
-    fn widened(&self, by: SlopeVariance) -> Self {
-        Self { alpha_squared: self.alpha_squared + 2.0 * by.get() }
-    }
 }
 
 pub(super) const ROW: Row = Row {
     name: "beckmann",
     parameter: ":ALPHA",
     summary: "Beckmann microfacet distribution D(n·h)",
-    parse: |text| Ok(Box::new(Beckmann::new(number(text, Alpha::new)?))),
+    parse: |text| Ok(AnyLobe::from(Beckmann::new(number(text, Alpha::new)?))),
     samples: &["beckmann:0.1", "beckmann:0.4"],
 };
 
@@ -50,15 +47,19 @@ pub(super) fn masking(u: f64, width: SlopeVariance) -> f64 {
     if a < 1.6 { (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a) } else { 1.0 }
 }
 
+impl Display for Beckmann {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", ROW.name, self.alpha_squared.sqrt())
+    }
+}
+
+impl Widen for Beckmann {
+    fn widened(&self, by: SlopeVariance) -> Self {
+        Self { alpha_squared: self.alpha_squared + 2.0 * by.get() }
+    }
+}
+
 impl Lobe for Beckmann {
-    fn spelling(&self) -> String {
-        format!("{}:{}", ROW.name, self.alpha_squared.sqrt())
-    }
-
-    fn argument(&self) -> Argument {
-        Argument::Half
-    }
-
     fn evaluate(&self, u: f64) -> f64 {
         // Below 1e-6 the exponential has underflowed for alpha up to 1, and u⁴ is about to for any.
         if u <= 1e-6 {
@@ -66,10 +67,6 @@ impl Lobe for Beckmann {
         }
         let u2 = (u * u).min(1.0);
         Microfacets::Beckmann.d(self.alpha_squared, u2, 1.0 - u2)
-    }
-
-    fn evaluate_all(&self, u: &mut [f64]) {
-        u.iter_mut().for_each(|u| *u = self.evaluate(*u));
     }
 
     fn slope_variance(&self) -> Option<SlopeVariance> {
@@ -83,14 +80,6 @@ impl Lobe for Beckmann {
 
     fn as_beckmann(&self) -> Option<Self> {
         None
-    }
-
-    fn widen(&self, by: SlopeVariance) -> Box<dyn Lobe> {
-        Box::new(self.widened(by))
-    }
-
-    fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64 {
-        self.widened(by).evaluate(u)
     }
 
     fn shader(&self) -> Cow<'static, str> {

@@ -5,8 +5,9 @@
 
 use std::borrow::Cow;
 use std::f64::consts::PI;
+use std::fmt::{self, Display};
 
-use super::{Argument, Lobe, Row, number, twin};
+use super::{AnyLobe, Lobe, Row, Widen, number, twin};
 use crate::units::{Exponent, SlopeVariance};
 
 /// A normalised Blinn-Phong highlight.
@@ -20,11 +21,19 @@ pub(super) const ROW: Row = Row {
     name: "blinn-phong",
     parameter: ":S",
     summary: "normalised cosine lobe (s+1)/2pi (n·h)^s",
-    parse: |text| Ok(Box::new(BlinnPhong { exponent: number(text, Exponent::new)? })),
+    parse: |text| Ok(AnyLobe::from(BlinnPhong { exponent: number(text, Exponent::new)? })),
     samples: &["blinn-phong:3", "blinn-phong:50", "blinn-phong:400.5"],
 };
 
-impl BlinnPhong {
+impl BlinnPhong {}
+
+impl Display for BlinnPhong {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", ROW.name, self.exponent)
+    }
+}
+
+impl Widen for BlinnPhong {
     fn widened(&self, by: SlopeVariance) -> Self {
         let s = self.exponent.get();
         let widened = (s / (1.0 + s * by.get())).max(1e-3);
@@ -33,14 +42,6 @@ impl BlinnPhong {
 }
 
 impl Lobe for BlinnPhong {
-    fn spelling(&self) -> String {
-        format!("{}:{}", ROW.name, self.exponent)
-    }
-
-    fn argument(&self) -> Argument {
-        Argument::Half
-    }
-
     fn evaluate(&self, u: f64) -> f64 {
         let mut one = [u];
         self.evaluate_all(&mut one);
@@ -60,14 +61,6 @@ impl Lobe for BlinnPhong {
 
     fn slope_variance(&self) -> Option<SlopeVariance> {
         Some(self.exponent.into())
-    }
-
-    fn widen(&self, by: SlopeVariance) -> Box<dyn Lobe> {
-        Box::new(self.widened(by))
-    }
-
-    fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64 {
-        self.widened(by).evaluate(u)
     }
 
     fn shader(&self) -> Cow<'static, str> {

@@ -6,8 +6,9 @@
 
 use std::borrow::Cow;
 use std::f64::consts::PI;
+use std::fmt::{self, Display};
 
-use super::{Argument, Lobe, Microfacets, Row, number, twin};
+use super::{AnyLobe, Lobe, Microfacets, Row, Widen, number, twin};
 use crate::units::{Alpha, SlopeVariance};
 
 /// A GGX distribution of microfacets.
@@ -22,39 +23,35 @@ impl Ggx {
     pub fn new(alpha: Alpha) -> Self {
         Self { alpha_squared: alpha.get() * alpha.get() }
     }
-
-    fn widened(&self, by: SlopeVariance) -> Self {
-        Self { alpha_squared: self.alpha_squared + 2.0 * by.get() }
-    }
 }
 
 pub(super) const ROW: Row = Row {
     name: "ggx",
     parameter: ":ALPHA",
     summary: "GGX (Trowbridge-Reitz) microfacet distribution D(n·h)",
-    parse: |text| Ok(Box::new(Ggx::new(number(text, Alpha::new)?))),
+    parse: |text| Ok(AnyLobe::from(Ggx::new(number(text, Alpha::new)?))),
     samples: &["ggx:0.1", "ggx:0.4"],
 };
 
+impl Display for Ggx {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", ROW.name, self.alpha_squared.sqrt())
+    }
+}
+
+impl Widen for Ggx {
+    fn widened(&self, by: SlopeVariance) -> Self {
+        Self { alpha_squared: self.alpha_squared + 2.0 * by.get() }
+    }
+}
+
 impl Lobe for Ggx {
-    fn spelling(&self) -> String {
-        format!("{}:{}", ROW.name, self.alpha_squared.sqrt())
-    }
-
-    fn argument(&self) -> Argument {
-        Argument::Half
-    }
-
     fn evaluate(&self, u: f64) -> f64 {
         if u <= 0.0 {
             return 0.0;
         }
         let u2 = (u * u).min(1.0);
         Microfacets::Ggx.d(self.alpha_squared, u2, 1.0 - u2)
-    }
-
-    fn evaluate_all(&self, u: &mut [f64]) {
-        u.iter_mut().for_each(|u| *u = self.evaluate(*u));
     }
 
     fn slope_variance(&self) -> Option<SlopeVariance> {
@@ -86,14 +83,6 @@ impl Lobe for Ggx {
 
     fn as_beckmann(&self) -> Option<super::Beckmann> {
         None
-    }
-
-    fn widen(&self, by: SlopeVariance) -> Box<dyn Lobe> {
-        Box::new(self.widened(by))
-    }
-
-    fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64 {
-        self.widened(by).evaluate(u)
     }
 
     fn shader(&self) -> Cow<'static, str> {

@@ -6,8 +6,9 @@
 
 use std::borrow::Cow;
 use std::f64::consts::{PI, SQRT_2};
+use std::fmt::{self, Display};
 
-use super::{Argument, Lobe, Row, twin};
+use super::{AnyLobe, Argument, Lobe, Row, Widen, twin};
 use crate::units::SlopeVariance;
 
 /// A diffuse surface, perhaps already widened by a lobe of normals.
@@ -19,10 +20,6 @@ pub struct Lambert {
 impl Lambert {
     /// Lambert's cosine.
     pub const SHARP: Self = Self { normals: SlopeVariance::ZERO };
-
-    fn widened(&self, by: SlopeVariance) -> Self {
-        Self { normals: self.normals.widen(by) }
-    }
 }
 
 pub(super) const ROW: Row = Row {
@@ -30,7 +27,7 @@ pub(super) const ROW: Row = Row {
     parameter: "",
     summary: "diffuse cosine max(n·l, 0)",
     parse: |text| {
-        if text.is_empty() { Ok(Box::new(Lambert::SHARP)) } else { Err("takes no number".to_owned()) }
+        if text.is_empty() { Ok(AnyLobe::from(Lambert::SHARP)) } else { Err("takes no number".to_owned()) }
     },
     samples: &["lambert"],
 };
@@ -47,11 +44,19 @@ pub fn mean_of_positive_part(mean: f64, variance: f64) -> f64 {
     mean * 0.5 * libm::erfc(-t / SQRT_2) + s * density
 }
 
-impl Lobe for Lambert {
-    fn spelling(&self) -> String {
-        ROW.name.to_owned()
+impl Display for Lambert {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(ROW.name)
     }
+}
 
+impl Widen for Lambert {
+    fn widened(&self, by: SlopeVariance) -> Self {
+        Self { normals: self.normals.widen(by) }
+    }
+}
+
+impl Lobe for Lambert {
     fn argument(&self) -> Argument {
         Argument::Light
     }
@@ -68,20 +73,8 @@ impl Lobe for Lambert {
         mean_of_positive_part(mean, second - mean * mean)
     }
 
-    fn evaluate_all(&self, u: &mut [f64]) {
-        u.iter_mut().for_each(|u| *u = self.evaluate(*u));
-    }
-
     fn slope_variance(&self) -> Option<SlopeVariance> {
         None
-    }
-
-    fn widen(&self, by: SlopeVariance) -> Box<dyn Lobe> {
-        Box::new(self.widened(by))
-    }
-
-    fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64 {
-        self.widened(by).evaluate(u)
     }
 
     fn shader(&self) -> Cow<'static, str> {

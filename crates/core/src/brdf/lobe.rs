@@ -4,9 +4,12 @@
 //! are all that a method needs of it: its **zonal coefficients**, and how it **widens** when convolved with an isotropic
 //! lobe of normals.
 
+use std::any::Any;
 use std::borrow::Cow;
 use std::f64::consts::{FRAC_PI_2, PI};
-use std::fmt::Debug;
+use std::fmt::{Debug, Display};
+use std::ops::Deref;
+use std::sync::Arc;
 
 use glam::DVec3;
 
@@ -24,28 +27,25 @@ pub enum Argument {
     Half,
 }
 
-/// A reflectance lobe around a normal.
-pub trait Lobe: Send + Sync + Debug {
-    /// As written on the command line, such as `blinn-phong:50`.
-    fn spelling(&self) -> String;
-
-    /// What `w` is.
-    fn argument(&self) -> Argument;
+/// Reflectance lobe around a normal, of a kind chosen at run time; [`AnyLobe`] owns one.
+///
+/// [`Display`] writes the spelling that [`AnyLobe`] reads, such as `blinn-phong:50`.
+pub trait Lobe: LobeObject + Debug + Display + Send + Sync {
+    /// The vector `w` that the lobe takes beside the normal.
+    fn argument(&self) -> Argument {
+        Argument::Half
+    }
 
     /// `f(u)`, u = w · n in [-1, 1]; zero where u ≤ 0 unless the lobe was widened.
     fn evaluate(&self, u: f64) -> f64;
 
     /// [`Self::evaluate`] of every element, in place.
-    fn evaluate_all(&self, u: &mut [f64]);
+    fn evaluate_all(&self, u: &mut [f64]) {
+        u.iter_mut().for_each(|u| *u = self.evaluate(*u));
+    }
 
     /// Slope variance of the lobe on one axis; `None` for Lambert, which is no narrow lobe.
     fn slope_variance(&self) -> Option<SlopeVariance>;
-
-    /// This lobe convolved with an isotropic lobe of normals of variance `by`; exactly itself for zero.
-    fn widen(&self, by: SlopeVariance) -> Box<dyn Lobe>;
-
-    /// [`Self::widen`], then [`Self::evaluate`], without a lobe on the heap: what a pixel asks of a lobe, once.
-    fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64;
 
     /// Smith's masking (Walter et al. 2007, section 5.1) at cosine `u > 0` to the normal, of a lobe of this kind that is
     /// `width` wide; Beckmann's, where a lobe has none of its own.
@@ -105,6 +105,93 @@ pub trait Lobe: Send + Sync + Debug {
     /// The approximation that Han et al. print for the zonal coefficients, if they do.
     fn zonal_as_printed(&self, _order: usize) -> Option<Vec<f64>> {
         None
+    }
+}
+
+/// How a kind of lobe widens.
+pub trait Widen: Lobe + Sized {
+    /// This lobe convolved with an isotropic lobe of normals of variance `by`; exactly itself for zero.
+    #[must_use]
+    fn widened(&self, by: SlopeVariance) -> Self;
+
+    /// [`Self::widened`], then [`Lobe::evaluate`].
+    fn value_widened(&self, by: SlopeVariance, u: f64) -> f64 {
+        self.widened(by).evaluate(u)
+    }
+}
+
+/// The part of [`Lobe`] that every kind has by its [`Widen`].
+pub trait LobeObject {
+    /// This lobe convolved with an isotropic lobe of normals of variance `by`; exactly itself for zero.
+    fn widen(&self, by: SlopeVariance) -> AnyLobe;
+
+    /// [`Self::widen`], then [`Lobe::evaluate`], without a lobe on the heap: what a pixel asks of a lobe, once.
+    fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64;
+
+    /// True for a lobe of the same kind and width.
+    fn equals(&self, other: &dyn Lobe) -> bool;
+
+    /// The lobe as what it is.
+    fn as_any(&self) -> &dyn Any;
+}
+
+impl<L: Widen + PartialEq + 'static> LobeObject for L {
+    fn widen(&self, by: SlopeVariance) -> AnyLobe {
+        AnyLobe::from(self.widened(by))
+    }
+
+    fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64 {
+        self.value_widened(by, u)
+    }
+
+    fn equals(&self, other: &dyn Lobe) -> bool {
+        other.as_any().downcast_ref::<L>() == Some(self)
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+}
+
+impl PartialEq for dyn Lobe {
+    fn eq(&self, other: &Self) -> bool {
+        self.equals(other)
+    }
+}
+
+/// Lobe of any kind, shared: cloned for nothing, compared by kind and width, read from and written as its spelling.
+#[derive(Clone)]
+pub struct AnyLobe(Arc<dyn Lobe>);
+
+impl<L: Widen + PartialEq + 'static> From<L> for AnyLobe {
+    fn from(lobe: L) -> Self {
+        Self(Arc::new(lobe))
+    }
+}
+
+impl Deref for AnyLobe {
+    type Target = dyn Lobe;
+
+    fn deref(&self) -> &Self::Target {
+        &*self.0
+    }
+}
+
+impl PartialEq for AnyLobe {
+    fn eq(&self, other: &Self) -> bool {
+        **self == **other
+    }
+}
+
+impl Debug for AnyLobe {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        Debug::fmt(&*self.0, f)
+    }
+}
+
+impl Display for AnyLobe {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        Display::fmt(&*self.0, f)
     }
 }
 

@@ -8,8 +8,9 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use crate::brdf::{Argument, Lobe};
+use crate::brdf::{AnyLobe, Argument};
 use crate::units::SlopeVariance;
+use crate::words;
 
 /// Which factor and which Fresnel term go with the lobe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,22 +32,9 @@ pub enum ShadingModel {
 /// Least `n·wo` that Tan et al.'s model divides by: a normal turned further from the eye counts as one at 87 degrees.
 pub const LEAST_COSINE: f64 = 0.05;
 
+words!(ShadingModel { Tan => "tan", Han => "han", Smith => "smith", Masked => "masked", Shadowed => "shadowed" });
+
 impl ShadingModel {
-    /// Every model.
-    pub const ALL: [Self; 5] = [Self::Tan, Self::Han, Self::Smith, Self::Masked, Self::Shadowed];
-
-    /// As spelled on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Tan => "tan",
-            Self::Han => "han",
-            Self::Smith => "smith",
-            Self::Masked => "masked",
-            Self::Shadowed => "shadowed",
-        }
-    }
-
     /// Its number in shaders.
     #[must_use]
     pub fn index(self) -> u32 {
@@ -113,15 +101,21 @@ pub struct SurfaceParams {
 }
 
 /// A lobe in a model: everything about a material that does not change over its surface.
-#[derive(Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Brdf {
     /// The lobe, where it is sharpest. Lambert leaves the diffuse part alone.
-    pub lobe: Box<dyn Lobe>,
+    pub lobe: AnyLobe,
     /// Its model.
     pub shading: ShadingModel,
 }
 
 impl Brdf {
+    /// A lobe in a shading model.
+    #[must_use]
+    pub fn new(lobe: impl Into<AnyLobe>, shading: ShadingModel) -> Self {
+        Self { lobe: lobe.into(), shading }
+    }
+
     /// Slope variance of the lobe at a place.
     #[must_use]
     pub fn width(&self, roughness: SlopeVariance) -> SlopeVariance {
@@ -189,7 +183,6 @@ impl Brdf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf;
 
     #[test]
     fn models_are_their_formulas() {
@@ -202,7 +195,7 @@ mod tests {
             specular: DVec3::splat(0.04),
             roughness: SlopeVariance::ZERO,
         };
-        let lobe = || brdf::parse("beckmann:0.3").unwrap();
+        let lobe = || "beckmann:0.3".parse::<AnyLobe>().unwrap();
         let d = lobe().evaluate(n.dot(directions.wh));
         let f = 0.04 + 0.96 * (1.0 - directions.u).powi(5);
         let (i, o) = (n.dot(directions.wi), n.dot(directions.wo));

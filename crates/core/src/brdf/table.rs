@@ -1,6 +1,8 @@
 //! The table of lobes, and how their spellings are read.
 
-use super::{Lobe, beckmann, blinn_phong, ggx, lambert, measured, torrance_sparrow};
+use std::str::FromStr;
+
+use super::{AnyLobe, beckmann, blinn_phong, ggx, lambert, measured, torrance_sparrow};
 
 /// A row of [`TABLE`].
 pub struct Row {
@@ -11,7 +13,7 @@ pub struct Row {
     /// One line for help and docs.
     pub summary: &'static str,
     /// Reads the parameter.
-    pub parse: fn(&str) -> Result<Box<dyn Lobe>, String>,
+    pub parse: fn(&str) -> Result<AnyLobe, String>,
     /// Spellings that the conformance tests run.
     pub samples: &'static [&'static str],
 }
@@ -43,16 +45,19 @@ pub enum ParseLobeError {
     },
 }
 
-/// Reads a spelling such as `blinn-phong:50`, `ggx:0.2` or `lambert`.
-///
-/// # Errors
-/// [`ParseLobeError`], naming what is wrong.
-pub fn parse(spelling: &str) -> Result<Box<dyn Lobe>, ParseLobeError> {
-    let (name, parameter) = spelling.split_once(':').unwrap_or((spelling, ""));
-    let row =
-        TABLE.iter().find(|row| row.name == name).ok_or_else(|| ParseLobeError::Unknown(name.to_owned()))?;
-    (row.parse)(parameter)
-        .map_err(|reason| ParseLobeError::Parameter { spelling: spelling.to_owned(), reason })
+impl FromStr for AnyLobe {
+    type Err = ParseLobeError;
+
+    /// Reads a spelling such as `blinn-phong:50`, `ggx:0.2` or `lambert`.
+    fn from_str(spelling: &str) -> Result<Self, ParseLobeError> {
+        let (name, parameter) = spelling.split_once(':').unwrap_or((spelling, ""));
+        let row = TABLE
+            .iter()
+            .find(|row| row.name == name)
+            .ok_or_else(|| ParseLobeError::Unknown(name.to_owned()))?;
+        (row.parse)(parameter)
+            .map_err(|reason| ParseLobeError::Parameter { spelling: spelling.to_owned(), reason })
+    }
 }
 
 /// Reads the one number of a lobe into its unit.

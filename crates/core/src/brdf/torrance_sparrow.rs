@@ -6,8 +6,9 @@
 
 use std::borrow::Cow;
 use std::f64::consts::PI;
+use std::fmt::{self, Display};
 
-use super::{Argument, Lobe, Row, number, twin};
+use super::{AnyLobe, Lobe, Row, Widen, number, twin};
 use crate::units::{LobeAngle, SlopeVariance};
 
 /// A Gaussian of the angle to the half-vector.
@@ -22,29 +23,29 @@ impl TorranceSparrow {
     pub fn new(sigma: LobeAngle) -> Self {
         Self { sigma_squared: sigma.get() * sigma.get() }
     }
-
-    fn widened(&self, by: SlopeVariance) -> Self {
-        Self { sigma_squared: self.sigma_squared + by.get() / 2.0 }
-    }
 }
 
 pub(super) const ROW: Row = Row {
     name: "torrance-sparrow",
     parameter: ":SIGMA",
     summary: "Gaussian of the half-vector's angle, sigma in radians",
-    parse: |text| Ok(Box::new(TorranceSparrow::new(number(text, LobeAngle::new)?))),
+    parse: |text| Ok(AnyLobe::from(TorranceSparrow::new(number(text, LobeAngle::new)?))),
     samples: &["torrance-sparrow:0.05", "torrance-sparrow:0.2"],
 };
 
+impl Display for TorranceSparrow {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", ROW.name, self.sigma_squared.sqrt())
+    }
+}
+
+impl Widen for TorranceSparrow {
+    fn widened(&self, by: SlopeVariance) -> Self {
+        Self { sigma_squared: self.sigma_squared + by.get() / 2.0 }
+    }
+}
+
 impl Lobe for TorranceSparrow {
-    fn spelling(&self) -> String {
-        format!("{}:{}", ROW.name, self.sigma_squared.sqrt())
-    }
-
-    fn argument(&self) -> Argument {
-        Argument::Half
-    }
-
     fn evaluate(&self, u: f64) -> f64 {
         if u <= 0.0 {
             return 0.0;
@@ -53,20 +54,8 @@ impl Lobe for TorranceSparrow {
         (-beta * beta / (4.0 * self.sigma_squared)).exp() / (4.0 * PI * self.sigma_squared)
     }
 
-    fn evaluate_all(&self, u: &mut [f64]) {
-        u.iter_mut().for_each(|u| *u = self.evaluate(*u));
-    }
-
     fn slope_variance(&self) -> Option<SlopeVariance> {
         Some(SlopeVariance::clamped(2.0 * self.sigma_squared))
-    }
-
-    fn widen(&self, by: SlopeVariance) -> Box<dyn Lobe> {
-        Box::new(self.widened(by))
-    }
-
-    fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64 {
-        self.widened(by).evaluate(u)
     }
 
     fn shader(&self) -> Cow<'static, str> {

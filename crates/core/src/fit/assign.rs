@@ -65,6 +65,7 @@ pub(crate) fn exp(x: f32) -> f32 {
 
 // Loops over lanes by number, one operation each: the form that becomes SIMD at every level, in the same order.
 #[inline(always)]
+#[expect(clippy::needless_range_loop, reason = "all planes are walked together, not the first alone")]
 fn assign_run<const J: usize, const N: usize>(
     theta: &[[f32; N]; J],
     samples: &Samples<N>,

@@ -382,6 +382,58 @@ impl Isotropic for Planar {
     }
 }
 
+/// Gaussians of `n.xy` of any covariance: `T(n) = (n.x, n.y, n.x², n.y², n.x n.y)`. Only tests have them.
+#[cfg(test)]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Elliptic;
+
+#[cfg(test)]
+impl Elliptic {
+    /// Covariance of sums over their weight: xx, yy, xy; held above the least variance.
+    fn covariance(&[alpha, x, y, xx, yy, xy]: &[f32; 6]) -> [f32; 3] {
+        let (x, y) = (x / alpha, y / alpha);
+        [
+            (xx / alpha - x * x).max(0.0) + LEAST_VARIANCE,
+            (yy / alpha - y * y).max(0.0) + LEAST_VARIANCE,
+            xy / alpha - x * y,
+        ]
+    }
+}
+
+#[cfg(test)]
+impl Family<6> for Elliptic {
+    fn statistics(self, n: Vec3) -> [f32; 6] {
+        [1.0, n.x, n.y, n.x * n.x, n.y * n.y, n.x * n.y]
+    }
+
+    /// `ln alpha - ln(tau sqrt|C|) - (n - m)ᵀ C⁻¹ (n - m)/2`, multiplied out.
+    fn natural(self, sums: &[f32; 6]) -> [f32; 6] {
+        if sums[0] <= DEAD {
+            return [NOWHERE, 0.0, 0.0, 0.0, 0.0, 0.0];
+        }
+        let [xx, yy, xy] = Self::covariance(sums);
+        let determinant = (xx * yy - xy * xy).max(LEAST_VARIANCE * LEAST_VARIANCE);
+        let [a, b, c] = [yy / determinant, xx / determinant, -xy / determinant];
+        let (x, y) = (sums[1] / sums[0], sums[2] / sums[0]);
+        let norm = sums[0].ln() - (std::f32::consts::TAU * determinant.sqrt()).ln();
+        let square = a * x * x + b * y * y + 2.0 * c * x * y;
+        [norm - 0.5 * square, a * x + c * y, b * y + c * x, -0.5 * a, -0.5 * b, -c]
+    }
+
+    fn mean(self, sums: &[f32; 6]) -> [f32; 3] {
+        let alpha = sums[0].max(DEAD);
+        [sums[1] / alpha, sums[2] / alpha, 0.0]
+    }
+
+    fn width(self, sums: &[f32; 6]) -> f32 {
+        if sums[0] <= DEAD {
+            return LEAST_VARIANCE;
+        }
+        let [xx, yy, _] = Self::covariance(sums);
+        0.5 * (xx + yy)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -37,6 +37,7 @@ use self::samples::{SampleGrid, Samples, Samplings};
 use crate::grid::{Grid, Size};
 use crate::pyramid::{footprint, level_sizes};
 use crate::surface::{Surface, SurfaceRow};
+use crate::words;
 
 /// The shape of the lobes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +48,27 @@ pub enum LobeKind {
     Planar,
     /// Phong peaks `(weight, n.x, n.y, exponent)`, which are no sums and cannot be filtered or aligned.
     Peaks,
+    /// Gaussians of `n.xy` of any covariance; sums of `(1, n.x, n.y, n.x², n.y², n.x n.y)`. Only tests have them.
+    #[cfg(test)]
+    Elliptic,
+}
+
+impl LobeKind {
+    /// Statistics of a lobe, its weight among them.
+    #[must_use]
+    pub fn statistics(self) -> usize {
+        match self {
+            Self::Spherical | Self::Planar | Self::Peaks => 4,
+            #[cfg(test)]
+            Self::Elliptic => 6,
+        }
+    }
+
+    /// RGBA layers of a lobe.
+    #[must_use]
+    pub fn layers(self) -> usize {
+        self.statistics().div_ceil(4)
+    }
 }
 
 /// How lobes of neighbouring texels are made to correspond.
@@ -65,22 +87,13 @@ pub enum Alignment {
     Unaligned,
 }
 
-impl Alignment {
-    /// Every alignment, the default first.
-    pub const ALL: [Self; 5] = [Self::Refined, Self::Parent, Self::Prior, Self::Matched, Self::Unaligned];
-
-    /// As spelled on the command line; the default goes without saying.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Refined => "refined",
-            Self::Parent => "parent",
-            Self::Prior => "prior",
-            Self::Matched => "matched",
-            Self::Unaligned => "unaligned",
-        }
-    }
-}
+words!(Alignment {
+    Refined => "refined",
+    Parent => "parent",
+    Prior => "prior",
+    Matched => "matched",
+    Unaligned => "unaligned",
+});
 
 /// What is to be fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -172,6 +185,8 @@ pub fn fit_levels<E>(
         LobeKind::Spherical => Fitter::<_, 4>::new(Spherical, fit, job).run(emit),
         LobeKind::Planar => Fitter::<_, 4>::new(Planar, fit, job).run(emit),
         LobeKind::Peaks => peaks::fit_levels(fit.lobes, job, emit),
+        #[cfg(test)]
+        LobeKind::Elliptic => Fitter::<_, 6>::new(family::Elliptic, fit, job).run(emit),
     }
 }
 

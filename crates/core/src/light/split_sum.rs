@@ -223,10 +223,11 @@ impl Reflected {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf;
+
+    use crate::brdf::AnyLobe;
 
     fn table(lobe: &str, shading: ShadingModel) -> SplitSum {
-        SplitSum::new(&Brdf { lobe: brdf::parse(lobe).unwrap(), shading })
+        SplitSum::new(&Brdf { lobe: lobe.parse::<AnyLobe>().unwrap(), shading })
     }
 
     #[test]
@@ -251,7 +252,7 @@ mod tests {
             ("ggx:0.3", ShadingModel::Shadowed),
             ("ggx:0.5", ShadingModel::Tan),
         ] {
-            let brdf = Brdf { lobe: brdf::parse(lobe).unwrap(), shading };
+            let brdf = Brdf { lobe: lobe.parse::<AnyLobe>().unwrap(), shading };
             let spread = SlopeVariance::clamped((3.0_f64 / 15.0).powi(2));
             let cosine = 12.0 / 15.0;
             let got = SplitSum::new(&brdf).lookup(cosine, spread);

@@ -175,18 +175,20 @@ impl Squares {
 mod tests {
     use super::*;
     use crate::bake::Bake;
+    use crate::brdf::AnyLobe;
     use crate::measure::DISK_RADIUS;
+    use crate::ndf::AnyMethod;
+    use crate::procedural;
     use crate::pyramid::Precision;
-    use crate::{brdf, ndf, procedural};
 
     /// Errors at level 3 of a built-in map.
     fn errors(map: &str, method: &str) -> FilteringError {
         let surface = (procedural::find(map).unwrap().build)(Size::new(128, 128).unwrap());
-        let lobe = brdf::parse("blinn-phong:50").unwrap();
+        let lobe = "blinn-phong:50".parse::<AnyLobe>().unwrap();
         let lattice = DiskLattice::new(40, DISK_RADIUS);
         let truth = TexelTruth::new(&*surface, &*lobe, &lattice);
         let corners = true_corners(&truth, surface.wraps(), &[3], &|_| ());
-        let method = ndf::parse(method).unwrap();
+        let method = method.parse::<AnyMethod>().unwrap();
         let bake =
             Bake { surface: &*surface, method: &*method, precision: Precision::Half, progress: &|_| () };
         filtering_error(&bake.to_pyramid().0, &*method, &*lobe, &lattice, &corners[0])

@@ -225,11 +225,12 @@ pub fn level_error(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{brdf, procedural};
+    use crate::brdf::AnyLobe;
+    use crate::procedural;
 
     #[test]
     fn culling_changes_nothing() {
-        let lobe = brdf::parse("blinn-phong:200").unwrap();
+        let lobe = "blinn-phong:200".parse::<AnyLobe>().unwrap();
         let lattice = lattice_for(&*lobe);
         let surface = (procedural::find("armour").unwrap().build)(Size::new(32, 32).unwrap());
         let mut truth = TexelTruth::new(&*surface, &*lobe, &lattice);
@@ -244,7 +245,7 @@ mod tests {
 
     #[test]
     fn nested_levels_equal_direct_ones() {
-        let lobe = brdf::parse("blinn-phong:30").unwrap();
+        let lobe = "blinn-phong:30".parse::<AnyLobe>().unwrap();
         let lattice = DiskLattice::new(16, DISK_RADIUS);
         let surface = (procedural::find("foil").unwrap().build)(Size::new(32, 32).unwrap());
         let truth = TexelTruth::new(&*surface, &*lobe, &lattice);

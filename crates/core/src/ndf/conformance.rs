@@ -2,9 +2,10 @@
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::{Decoded, FlatLobe, Method, TABLE, parse};
+use super::elliptic::Elliptic;
+use super::{AnyMethod, FlatLobe, Method, Representation, TABLE};
 use crate::bake::Bake;
-use crate::brdf::{self, Lobe};
+use crate::brdf::{self, AnyLobe, Lobe};
 use crate::fit::Alignment;
 use crate::grid::{Grid, Size};
 use crate::procedural;
@@ -12,8 +13,14 @@ use crate::pyramid::Precision;
 use crate::sphere::{DiskLattice, gauss_legendre, legendre};
 use crate::surface::{NormalGrid, Surface, SurfaceRow, Wraps, normal_of_slope};
 
-fn methods() -> Vec<Box<dyn Method>> {
-    TABLE.iter().flat_map(|row| row.samples).map(|s| parse(s).unwrap()).collect()
+fn method(spelling: &str) -> AnyMethod {
+    spelling.parse().unwrap()
+}
+
+fn methods() -> Vec<AnyMethod> {
+    let table = TABLE.iter().flat_map(|row| row.samples).map(|s| method(s));
+    // One whose lobes have six statistics, in two layers each.
+    table.chain([AnyMethod::from(Elliptic::new(2))]).collect()
 }
 
 fn of_normals(size: (usize, usize), normal: impl FnMut(usize, usize) -> Vec3) -> NormalGrid {
@@ -27,10 +34,12 @@ fn bake(method: &dyn Method, surface: &dyn Surface, precision: Precision) -> cra
 
 /// What must be the same however normals are shared out among lobes: the channels, summed over fitted lobes.
 fn totals(method: &dyn Method, channels: &[f32]) -> Vec<f32> {
-    if method.fit().is_none() {
+    let Some(layout) = method.lobe_layout().filter(|_| method.fit().is_some()) else {
         return channels.to_vec();
-    }
-    (0..4).map(|c| channels.iter().skip(c).step_by(4).sum()).collect()
+    };
+    let each = 4 * layout.layers_each;
+    let statistics = method.fit().map_or(each, |fit| fit.kind.statistics());
+    (0..statistics).map(|c| channels.iter().skip(c).step_by(each).sum()).collect()
 }
 
 #[test]
@@ -38,14 +47,14 @@ fn spellings_round_trip() {
     for row in TABLE {
         assert!(!row.samples.is_empty(), "{}", row.name);
         for sample in row.samples {
-            assert_eq!(parse(sample).unwrap().spelling(), *sample);
+            assert_eq!(method(sample).to_string(), *sample);
         }
     }
 }
 
 #[test]
 fn bad_spellings_say_why() {
-    let message = |s: &str| parse(s).unwrap_err().to_string();
+    let message = |s: &str| s.parse::<AnyMethod>().unwrap_err().to_string();
     assert_eq!(message("vfm:4"), "there is no method called `vfm`");
     assert_eq!(message("naive:3"), "method `naive:3`: takes no parameter");
     assert_eq!(
@@ -68,7 +77,7 @@ fn bad_spellings_say_why() {
 #[test]
 fn rows_equal_texels_one_by_one() {
     // Whole rows may take a faster way; its bits must be those of the plain one.
-    fn plain<R: super::Representation>(representation: &R, row: &SurfaceRow) -> Vec<f32> {
+    fn plain<R: Representation>(representation: &R, row: &SurfaceRow) -> Vec<f32> {
         let width = row.width();
         let mut channels = vec![0.0; representation.layers() * 4 * width];
         for i in 0..width {
@@ -105,7 +114,7 @@ fn a_flat_map_gives_back_the_brdf_at_every_level() {
     for method in methods() {
         let pyramid = bake(&*method, &flat, Precision::Single);
         for spelling in brdf::TABLE.iter().flat_map(|row| row.samples) {
-            let lobe = brdf::parse(spelling).unwrap();
+            let lobe = spelling.parse::<AnyLobe>().unwrap();
             let evaluator = method.evaluator(&*lobe, &lattice.directions);
             let peak = lobe.evaluate(1.0);
             for (level, size) in pyramid.sizes().iter().enumerate() {
@@ -114,17 +123,13 @@ fn a_flat_map_gives_back_the_brdf_at_every_level() {
                 for (got, w) in got.iter().zip(&lattice.directions) {
                     let expected = match method.flat_lobe(&*lobe) {
                         FlatLobe::Exact => lobe.evaluate(w.z),
-                        FlatLobe::BandLimited(_) if method.spelling().ends_with("printed") => continue,
+                        FlatLobe::BandLimited(_) if method.to_string().ends_with("printed") => continue,
                         FlatLobe::BandLimited(order) => band_limited(&*lobe, order, w.z),
                         FlatLobe::OwnKernel => continue,
                     };
                     // 1e-4 of the peak is the promise; single-precision storage leaves about 1e-6.
                     let error = (got - expected).abs() / peak;
-                    assert!(
-                        error < 1e-4,
-                        "{} {spelling} level {level} {w}: {got} {expected}",
-                        method.spelling()
-                    );
+                    assert!(error < 1e-4, "{} {spelling} level {level} {w}: {got} {expected}", method);
                 }
             }
         }
@@ -135,11 +140,11 @@ fn a_flat_map_gives_back_the_brdf_at_every_level() {
 fn a_lobe_within_the_band_limit_comes_back_whole() {
     // sh:16 holds Blinn-Phong up to s = 10 to 1e-4: rho_17 = exp(-17²/20) = 5e-7, times 35/4pi.
     let flat = of_normals((4, 4), |_, _| Vec3::Z);
-    let method = parse("sh:16").unwrap();
+    let method = method("sh:16");
     let pyramid = bake(&*method, &flat, Precision::Single);
     let lattice = DiskLattice::new(24, 0.97);
     for spelling in ["blinn-phong:3", "blinn-phong:10"] {
-        let lobe = brdf::parse(spelling).unwrap();
+        let lobe = spelling.parse::<AnyLobe>().unwrap();
         let mut got = vec![0.0; lattice.len()];
         method.evaluator(&*lobe, &lattice.directions).evaluate(&pyramid.texel(1, 0, 0), &mut got);
         for (got, w) in got.iter().zip(&lattice.directions) {
@@ -160,8 +165,8 @@ fn a_constant_map_is_the_same_at_every_level() {
         for (a, b) in fine.iter().zip(coarse) {
             // Averages of equal numbers: rounding of single floats only. The integrated factors are
             // computed from moments whose covariance is nothing but that rounding.
-            let tolerance = if method.spelling().ends_with("integrated") { 1e-3 } else { 2e-6 };
-            assert!((a - b).abs() <= tolerance * a.abs().max(1.0), "{} {a} {b}", method.spelling());
+            let tolerance = if method.to_string().ends_with("integrated") { 1e-3 } else { 2e-6 };
+            assert!((a - b).abs() <= tolerance * a.abs().max(1.0), "{} {a} {b}", method);
         }
     }
 }
@@ -171,7 +176,7 @@ fn levels_are_area_weighted_means_of_the_finest() {
     // The direct mean, from nothing but footprints, at sizes where no level nests in the one before.
     let size = Size::new(21, 13).unwrap();
     let surface = (procedural::find("armour").unwrap().build)(size);
-    for method in methods().iter().filter(|m| !m.spelling().ends_with("integrated") && m.filterable()) {
+    for method in methods().iter().filter(|m| !m.to_string().ends_with("integrated") && m.filterable()) {
         let pyramid = bake(&**method, &*surface, Precision::Single);
         let mut row = SurfaceRow::flat(21);
         let mut fine = Vec::new();
@@ -179,9 +184,9 @@ fn levels_are_area_weighted_means_of_the_finest() {
             surface.read_row(y, &mut row);
             let mut values = vec![0.0; 21 * 4 * method.layers()];
             method.accumulate_row(&row, &mut values);
-            if method.fit().is_some() {
-                // All in the first lobe's layer, which is also their sum.
-                values.truncate(21 * 4);
+            if let Some(layout) = method.lobe_layout() {
+                // All in the first lobe's layers, which are also their sum; other lobes' spare channels are ones.
+                values.truncate(21 * 4 * layout.layers_each);
             }
             fine.push(values);
         }
@@ -211,11 +216,7 @@ fn levels_are_area_weighted_means_of_the_finest() {
                         Some(_) => 5e-4,
                     };
                     let error = (f64::from(*got) - expected).abs();
-                    assert!(
-                        error < tolerance * expected.abs().max(1.0),
-                        "{} {level} {x} {y} {c}",
-                        method.spelling()
-                    );
+                    assert!(error < tolerance * expected.abs().max(1.0), "{} {level} {x} {y} {c}", method);
                 }
             }
         }
@@ -231,7 +232,7 @@ fn any_number_of_threads_gives_the_same_bytes() {
             pool.install(|| bake(&*method, &*surface, Precision::Half))
         };
         let one = with(1);
-        assert!(one == with(2) && one == with(8), "{}", method.spelling());
+        assert!(one == with(2) && one == with(8), "{}", method);
     }
 }
 
@@ -246,7 +247,7 @@ fn degenerate_normals_stay_finite() {
             let pyramid = bake(&*method, &surface, precision);
             for spelling in ["lambert", "blinn-phong:50", "ggx:0.01", "beckmann:0.5", "torrance-sparrow:0.1"]
             {
-                let lobe = brdf::parse(spelling).unwrap();
+                let lobe = spelling.parse::<AnyLobe>().unwrap();
                 let evaluator = method.evaluator(&*lobe, &lattice.directions);
                 for (level, size) in pyramid.sizes().iter().enumerate() {
                     for i in 0..size.area() {
@@ -255,7 +256,7 @@ fn degenerate_normals_stay_finite() {
                         assert!(
                             out.iter().all(|f| f.is_finite() && *f >= 0.0),
                             "{} {spelling} level {level}",
-                            method.spelling()
+                            method
                         );
                     }
                 }
@@ -281,18 +282,15 @@ fn lobes_of_degenerate_maps_have_weights_that_sum_to_one_and_point_somewhere() {
             for (level, size) in pyramid.sizes().iter().enumerate() {
                 for i in 0..size.area() {
                     let texel = pyramid.texel(level, i % size.width, i / size.width);
-                    let lobes: Vec<(f64, DVec3)> = match method.describe(&texel) {
-                        Decoded::Lobes(l) | Decoded::Peaks(l) => {
-                            l.iter().map(|l| (l.weight, l.mean)).collect()
-                        }
-                        Decoded::PlanarLobes(l) => l.iter().map(|l| (l.weight, l.mean.extend(0.0))).collect(),
-                        other => panic!("{} decodes to {other:?}", method.spelling()),
-                    };
+                    let decoded = method.describe(&texel);
+                    let lobes: Vec<(f64, DVec3)> =
+                        decoded.lobes().iter().map(|l| (l.weight, l.mean)).collect();
+                    assert!(!lobes.is_empty(), "{method} decodes to {decoded:?}");
                     let total: f64 = lobes.iter().map(|l| l.0).sum();
                     // Peaks are not divided by their sum: eight rounded half floats.
-                    assert!((total - 1.0).abs() < 2e-3, "{} level {level}: {lobes:?}", method.spelling());
+                    assert!((total - 1.0).abs() < 2e-3, "{} level {level}: {lobes:?}", method);
                     let points = |m: DVec3| m.is_finite() && (m.z == 0.0 || (m.length() - 1.0).abs() < 1e-6);
-                    assert!(lobes.iter().all(|l| l.0 > 0.0 && points(l.1)), "{}", method.spelling());
+                    assert!(lobes.iter().all(|l| l.0 > 0.0 && points(l.1)), "{}", method);
                 }
             }
         }
@@ -308,17 +306,13 @@ fn half_floats_and_sharp_lobes_stay_in_bounds() {
     for method in methods() {
         let pyramid = bake(&*method, &*surface, Precision::Half);
         for spelling in ["beckmann:0.01", "blinn-phong:20000", "ggx:0.003"] {
-            let lobe = brdf::parse(spelling).unwrap();
+            let lobe = spelling.parse::<AnyLobe>().unwrap();
             let evaluator = method.evaluator(&*lobe, &lattice.directions);
             for i in 0..256 {
                 let mut out = vec![0.0; lattice.len()];
                 evaluator.evaluate(&pyramid.texel(1, i % 64, i / 4), &mut out);
                 let bound = 20.0 * lobe.evaluate(1.0);
-                assert!(
-                    out.iter().all(|f| *f >= 0.0 && *f <= bound),
-                    "{} {spelling} texel {i}",
-                    method.spelling()
-                );
+                assert!(out.iter().all(|f| *f >= 0.0 && *f <= bound), "{} {spelling} texel {i}", method);
             }
         }
     }
@@ -328,14 +322,14 @@ fn half_floats_and_sharp_lobes_stay_in_bounds() {
 fn any_finite_channels_decode_to_something_finite() {
     // What a damaged but well-formed file can hold.
     for method in methods() {
-        let lobe = brdf::parse("blinn-phong:50").unwrap();
+        let lobe = "blinn-phong:50".parse::<AnyLobe>().unwrap();
         let directions = [DVec3::Z, DVec3::new(0.6, 0.0, 0.8)];
         let evaluator = method.evaluator(&*lobe, &directions);
         for fill in [0.0, 1.0, -1.0, 65504.0, -65504.0, 1e-7] {
             let channels = vec![fill; 4 * method.layers()];
             let mut out = [0.0; 2];
             evaluator.evaluate(&channels, &mut out);
-            assert!(out.iter().all(|f| f.is_finite()), "{} {fill} {out:?}", method.spelling());
+            assert!(out.iter().all(|f| f.is_finite()), "{} {fill} {out:?}", method);
         }
     }
 }
@@ -352,7 +346,7 @@ fn effective_lobes_keep_their_energy() {
             0.2 * ((y * 3 + x) % 8) as f32 / 8.0 - 0.1,
         ))
     });
-    let lobe = brdf::parse("blinn-phong:30").unwrap();
+    let lobe = "blinn-phong:30".parse::<AnyLobe>().unwrap();
     let mut directions = Vec::new();
     let mut weights = Vec::new();
     for (z, weight) in gauss_legendre(64) {
@@ -364,7 +358,7 @@ fn effective_lobes_keep_their_energy() {
         }
     }
     for method in methods() {
-        let name = method.spelling();
+        let name = method.to_string();
         let too_narrow = matches!(method.flat_lobe(&*lobe), FlatLobe::BandLimited(order) if order < 11);
         if too_narrow || name.starts_with("ndm") && !name.ends_with("integrated") {
             continue;
@@ -378,5 +372,14 @@ fn effective_lobes_keep_their_energy() {
         let planar = name.starts_with("slopes") || name.starts_with("gmm");
         let tolerance = if planar || name.ends_with("integrated") { 0.05 } else { 0.01 };
         assert!((total - 1.0).abs() < tolerance, "{name} {total}");
+    }
+}
+
+#[test]
+fn a_texel_has_the_form_that_its_method_says() {
+    for method in methods() {
+        let channels = vec![0.5; 4 * method.layers()];
+        assert_eq!(method.form_of(&channels), method.form_kind(), "{method}");
+        assert_eq!(method.shader().form(), method.form_kind(), "{method}");
     }
 }

@@ -12,7 +12,7 @@ use glam::{DMat3, DVec3};
 
 use super::leadr::{SlopeGrid, SlopeSample};
 use super::reflect::responding_normal;
-use super::{FilteredTexel, NormalLobe, Representation, SlopeGaussian, direction_or_up};
+use super::{FilteredTexel, Form, NormalLobe, Representation, SlopeGaussian};
 use crate::brdf::{Brdf, Directions, Lobe, Microfacets, ShadingModel, SurfaceParams};
 use crate::light::SplitSum;
 use crate::light::environment::{FilteredEnvironment, HALF_VECTOR_ORDER, Technique};
@@ -34,37 +34,33 @@ pub struct LocalEnvironment<'a> {
 }
 
 /// Light that a filtered texel sends to the eye.
-pub(super) fn reflect<R: Representation + ?Sized>(
+pub(super) fn reflect<R: Representation>(
     representation: &R,
     texel: &FilteredTexel<'_>,
-    brdf: &Brdf,
     local: &LocalEnvironment<'_>,
 ) -> DVec3 {
     let decoded = representation.decode(&representation.unpack(texel.channels));
-    if let Some((slopes, grid)) = representation.displaced(&decoded) {
-        return of_slopes((slopes, grid), texel, brdf, local);
+    let form = representation.form(&decoded);
+    match &form {
+        Form::Slopes(slopes, grid) => of_slopes(slopes, grid, texel, local),
+        Form::Lobes(lobes, _) => {
+            let of = |lobe: &NormalLobe| {
+                lobe.weight * of_lobe(lobe, &(texel.params)(Some(lobe.index)), texel, local)
+            };
+            lobes.iter().map(of).sum()
+        }
+        Form::Whole(_) => of_lobe(&form.whole(), &(texel.params)(None), texel, local),
     }
-    let printed = texel.at_means;
-    let Some((_, lobes)) = representation.isotropic(&decoded) else {
-        let mean = representation.mean(&decoded);
-        let length = mean.length().clamp(1e-3, 1.0);
-        let whole = NormalLobe::alone(direction_or_up(mean), SlopeVariance::clamped((1.0 - length) / length));
-        return of_lobe(&whole, &(texel.params)(None), printed, brdf, local);
-    };
-    let of = |lobe: &NormalLobe| {
-        lobe.weight * of_lobe(lobe, &(texel.params)(Some(lobe.layer)), printed, brdf, local)
-    };
-    lobes.iter().map(of).sum()
 }
 
 /// Light of one lobe of normals.
 fn of_lobe(
     lobe: &NormalLobe,
     params: &SurfaceParams,
-    printed: bool,
-    brdf: &Brdf,
+    texel: &FilteredTexel<'_>,
     local: &LocalEnvironment<'_>,
 ) -> DVec3 {
+    let (brdf, printed) = (&texel.prepared.brdf, texel.at_means);
     let mu = lobe.direction();
     let spread = lobe.variance.widen(params.roughness);
     let reflected = local.split_sum.lookup(mu.dot(local.wo), spread);
@@ -99,11 +95,12 @@ fn over_half_vectors(mu: DVec3, spread: SlopeVariance, printed: bool, local: &Lo
 
 /// Light of a Gaussian of slopes.
 fn of_slopes(
-    (g, grid): (&SlopeGaussian, &SlopeGrid),
+    g: &SlopeGaussian,
+    grid: &SlopeGrid,
     texel: &FilteredTexel<'_>,
-    brdf: &Brdf,
     local: &LocalEnvironment<'_>,
 ) -> DVec3 {
+    let brdf = &texel.prepared.brdf;
     let (wo, params) = (local.wo, (texel.params)(None));
     let displaced = texel.slope_map.is_some();
     let g = texel.slope_map.map_or(*g, |by| g.stretched(by));
@@ -240,9 +237,11 @@ fn profile(lobe: &dyn Lobe, sample: &SlopeSample) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf;
+
+    use crate::brdf::AnyLobe;
     use crate::light::environment::{SceneEnvironment, builtin};
-    use crate::ndf;
+
+    use crate::ndf::AnyMethod;
     use glam::DMat2;
     use std::sync::OnceLock;
 
@@ -255,7 +254,7 @@ mod tests {
 
     /// Light of a Gaussian of slopes, of deviations along x and y, to an eye at a cosine to the base surface.
     fn light(method: &str, brdf: &Brdf, (x, y): (f64, f64), (environment, cosine): (&str, f64)) -> DVec3 {
-        let method = ndf::parse(method).unwrap();
+        let method = method.parse::<AnyMethod>().unwrap();
         let environment = built(environment);
         let split_sum = SplitSum::new(brdf);
         environment.filtered.make(Technique::Prefiltered, split_sum.microfacets);
@@ -279,7 +278,7 @@ mod tests {
             wo: DVec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine),
             split_sum: &split_sum,
         };
-        method.reflect_environment(&texel, brdf, &local)
+        method.reflect_environment(&texel, &local)
     }
 
     const DEVIATIONS: [(f64, f64); 5] = [(0.1, 0.1), (0.25, 0.25), (0.5, 0.5), (0.5, 0.1), (0.1, 0.5)];
@@ -287,7 +286,7 @@ mod tests {
     #[test]
     fn five_by_five_slopes_are_enough_for_diffuse_facets() {
         // Dupuy et al. 2013, section 2.3: 5 × 5 has all that matters, 9 × 9 is the converged result. Asked for: within 1 %.
-        let brdf = Brdf { lobe: brdf::parse("lambert").unwrap(), shading: ShadingModel::Masked };
+        let brdf = Brdf { lobe: "lambert".parse::<AnyLobe>().unwrap(), shading: ShadingModel::Masked };
         for deviations in DEVIATIONS {
             for cosine in [1.0, 0.8, 0.5, 0.2] {
                 let by = |method| light(method, &brdf, deviations, ("studio", cosine));
@@ -306,7 +305,7 @@ mod tests {
     fn mirrors_that_hide_each_other_reflect_a_white_sky_whole() {
         // Whatever the slopes: what the eye sees of facets that mirror all, is white.
         for lobe in ["beckmann:0.1", "ggx:0.2"] {
-            let brdf = Brdf { lobe: brdf::parse(lobe).unwrap(), shading: ShadingModel::Masked };
+            let brdf = Brdf { lobe: lobe.parse::<AnyLobe>().unwrap(), shading: ShadingModel::Masked };
             for deviations in DEVIATIONS {
                 for (method, cosine) in
                     [("slopes", 0.9), ("slopes:9", 0.3), ("slopes:9:drawn", 0.6), ("slopes:32", 0.05)]
@@ -320,14 +319,14 @@ mod tests {
             }
         }
         // And with shadows less of it, more so where it is rough.
-        let brdf = Brdf { lobe: brdf::parse("beckmann:0.1").unwrap(), shading: ShadingModel::Shadowed };
+        let brdf = Brdf { lobe: "beckmann:0.1".parse::<AnyLobe>().unwrap(), shading: ShadingModel::Shadowed };
         let shadowed = |deviation| light("slopes:32", &brdf, (deviation, deviation), ("white", 0.5)).x;
         assert!(shadowed(0.1) < 1.0 && shadowed(0.5) < shadowed(0.25), "{} {}", shadowed(0.1), shadowed(0.5));
     }
 
     #[test]
     fn more_slopes_are_nearer_to_the_converged_mirror() {
-        let brdf = Brdf { lobe: brdf::parse("beckmann:0.07").unwrap(), shading: ShadingModel::Masked };
+        let brdf = Brdf { lobe: "beckmann:0.07".parse::<AnyLobe>().unwrap(), shading: ShadingModel::Masked };
         // Over twelve views, of isotropic roughness; across scratches the paper too asks for more.
         for deviation in [0.1, 0.25, 0.5] {
             let (mut off, mut all) = ([0.0; 3], 0.0);

@@ -4,16 +4,18 @@
 //! (BC5) normal maps are in most engines: mean of `n.xy`, z rebuilt. It is also Tan et al.'s "fixed BRDF"
 //! (2005, section 4): one planar lobe at `E[n.xy]` whose width never changes.
 
+use std::fmt::{self, Display};
+
 use glam::{DVec2, DVec3, Vec2};
 
-use super::mixture::{Cosine, NormalLobe, cosine};
+use super::mixture::cosine;
 use super::naive::UnitMean;
-use super::{Representation, Row, Sample, no_parameters};
+use super::{Describe, Encoding, Form, FormKind, Representation, Row, Sample, table::no_parameters};
 use crate::brdf::Lobe;
 use crate::shader::Shader;
 
 /// The do-nothing baseline.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fixed;
 
 pub(super) const ROW: Row = Row {
@@ -25,17 +27,29 @@ pub(super) const ROW: Row = Row {
     samples: &["fixed"],
 };
 
+impl Display for Fixed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(ROW.name)
+    }
+}
+
+impl Describe for Fixed {
+    fn encoding(&self) -> Encoding {
+        Encoding::MeanXy
+    }
+
+    fn form_kind(&self) -> FormKind {
+        FormKind::Lobes
+    }
+
+    fn shader(&self) -> Shader {
+        Shader::new(FormKind::Lobes, &[include_str!("fixed.wgsl"), include_str!("sphere_cosine.wgsl")])
+    }
+}
+
 impl Representation for Fixed {
     type Sums = Vec2;
     type Lobes = UnitMean;
-
-    fn spelling(&self) -> String {
-        ROW.name.to_owned()
-    }
-
-    fn layers(&self) -> usize {
-        1
-    }
 
     fn zero(&self) -> Vec2 {
         Vec2::ZERO
@@ -62,23 +76,11 @@ impl Representation for Fixed {
         UnitMean::new(xy.extend((1.0 - xy.length_squared()).max(0.0).sqrt()))
     }
 
-    fn mean(&self, lobes: &UnitMean) -> DVec3 {
-        lobes.alone().mean
+    fn form<'a>(&'a self, lobes: &UnitMean) -> Form<'a> {
+        Form::Lobes(vec![lobes.alone()], cosine)
     }
 
     fn effective<'a>(&'a self, lobes: &UnitMean, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         lobes.effective(lobe)
-    }
-
-    fn shader(&self) -> Shader {
-        Shader::new(&[
-            include_str!("fixed.wgsl"),
-            include_str!("sphere_cosine.wgsl"),
-            include_str!("mixture.wgsl"),
-        ])
-    }
-
-    fn isotropic(&self, lobes: &UnitMean) -> Option<(Cosine, Vec<NormalLobe>)> {
-        Some((cosine, vec![lobes.alone()]))
     }
 }

@@ -6,17 +6,23 @@
 //! A lobe is shaded in the plane too: the BRDF widened by `sigma²`, as a function of `|w.xy - mu|`, which for a Gaussian
 //! BRDF lobe is the paper's sum of variances.
 
+use std::fmt::{self, Display};
+
 use glam::{DVec2, DVec3};
 
-use super::mixture::{Cosine, LobeSums, MixtureEvaluator, NormalLobe, effective, mean_of, parse_mixture};
-use super::{Decoded, Evaluator, Method, PlanarLobe, Representation, Row, Sample};
+use super::mixture::{LobeSums, MixtureEvaluator, NormalLobe, effective, parse_mixture};
+use super::table::counted;
+use super::{
+    AnyMethod, Decoded, Describe, Encoding, Evaluator, Form, FormKind, ParameterError, Representation, Row,
+    Sample, StoredSums, mixture::spell,
+};
 use crate::brdf::Lobe;
-use crate::fit::{Fit, LobeKind};
+use crate::fit::{Alignment, Fit, LobeKind, MAX_LOBES};
 use crate::shader::Shader;
 use crate::units::SlopeVariance;
 
 /// Planar Gaussian lobes.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gmm {
     fit: Fit,
     /// Variances interpolated as printed.
@@ -32,9 +38,9 @@ pub(super) const ROW: Row = Row {
     samples: &["gmm:4", "gmm:1", "gmm:4:prior", "gmm:3:parent", "gmm:2:unaligned", "gmm:4:printed"],
 };
 
-fn parse(words: &[&str]) -> Result<Box<dyn Method>, String> {
-    let (fit, printed) = parse_mixture(words, LobeKind::Planar, "printed", "gmm")?;
-    Ok(Box::new(Gmm { fit, printed }))
+fn parse(words: &[&str]) -> Result<AnyMethod, ParameterError> {
+    let fit = |lobes| Gmm::new(lobes).map(|gmm| gmm.fit);
+    parse_mixture(words, fit, "printed").map(|(fit, printed)| AnyMethod::from(Gmm { fit, printed }))
 }
 
 /// The mixture a texel stands for; means are `(x, y, 0)`.
@@ -46,13 +52,7 @@ pub struct GaussianMixture {
 
 impl From<GaussianMixture> for Decoded {
     fn from(mixture: GaussianMixture) -> Self {
-        let lobe = |l: &NormalLobe| PlanarLobe {
-            layer: l.layer,
-            weight: l.weight,
-            mean: l.mean.truncate(),
-            variance: l.variance.get(),
-        };
-        Self::PlanarLobes(mixture.lobes.iter().map(lobe).collect())
+        Self::PlanarLobes(mixture.lobes)
     }
 }
 
@@ -68,36 +68,72 @@ fn planar_cosine(w: DVec3, mu: DVec3) -> f64 {
 }
 
 impl Gmm {
+    /// This many lobes a texel, 1 to [`MAX_LOBES`], aligned by refinement.
+    ///
+    /// # Errors
+    /// [`ParameterError::Count`] for another number.
+    pub fn new(lobes: usize) -> Result<Self, ParameterError> {
+        let lobes = counted(lobes, "number of lobes", 1..=MAX_LOBES, "gmm:4")?;
+        let fit = Fit { kind: LobeKind::Planar, lobes, alignment: Alignment::default() };
+        Ok(Self { fit, printed: false })
+    }
+
+    /// The same, lobes of neighbours made to correspond in another way.
+    #[must_use]
+    pub fn alignment(mut self, alignment: Alignment) -> Self {
+        self.fit.alignment = alignment;
+        self
+    }
+
+    /// The same, variances interpolated as the paper prints it.
+    #[must_use]
+    pub fn printed(self) -> Self {
+        Self { printed: true, ..self }
+    }
+
     fn lobes(&self, sums: &LobeSums) -> Vec<NormalLobe> {
         let total = sums.total();
-        let lobe = |(layer, &[alpha, x, y, q]): (usize, &[f32; 4])| {
+        let lobe = |(index, &[alpha, x, y, q]): (usize, &[f32; 4])| {
             let alpha = f64::from(alpha);
             let (x, y, q) = (f64::from(x) / alpha, f64::from(y) / alpha, f64::from(q) / alpha);
             let second = q - x * x - y * y;
             let variance = SlopeVariance::clamped(if self.printed { second } else { second / 2.0 });
             // Damaged files aside, means lie in the unit disk.
             let mean = DVec3::new(x.clamp(-1.5, 1.5), y.clamp(-1.5, 1.5), 0.0);
-            NormalLobe { layer, weight: alpha / total, mean, variance }
+            NormalLobe { index, weight: alpha / total, mean, variance }
         };
         sums.alive().map(lobe).collect()
+    }
+}
+
+impl Display for Gmm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&spell(ROW.name, &self.fit, self.printed.then_some("printed")))
+    }
+}
+
+impl Describe for Gmm {
+    fn encoding(&self) -> Encoding {
+        let sums = if self.printed { StoredSums::AsPrinted } else { StoredSums::Plain };
+        Encoding::Lobes { kind: self.fit.kind, count: self.fit.lobes, sums }
+    }
+
+    fn form_kind(&self) -> FormKind {
+        FormKind::Lobes
+    }
+
+    fn shader(&self) -> Shader {
+        Shader::new(FormKind::Lobes, &[include_str!("gmm.wgsl")]).constant("PRINTED", self.printed)
+    }
+
+    fn fit(&self) -> Option<Fit> {
+        Some(self.fit)
     }
 }
 
 impl Representation for Gmm {
     type Sums = LobeSums;
     type Lobes = GaussianMixture;
-
-    fn spelling(&self) -> String {
-        super::mixture::spell(ROW.name, &self.fit, self.printed.then_some("printed"))
-    }
-
-    fn layers(&self) -> usize {
-        self.fit.lobes
-    }
-
-    fn encoding(&self) -> &'static str {
-        if self.printed { "sums-as-printed" } else { "sums" }
-    }
 
     fn zero(&self) -> LobeSums {
         LobeSums::zero(self.fit.lobes)
@@ -125,8 +161,8 @@ impl Representation for Gmm {
         GaussianMixture { lobes: self.lobes(sums) }
     }
 
-    fn mean(&self, lobes: &GaussianMixture) -> DVec3 {
-        mean_of(&lobes.lobes)
+    fn form<'a>(&'a self, lobes: &GaussianMixture) -> Form<'a> {
+        Form::Lobes(lobes.lobes.clone(), planar_cosine)
     }
 
     fn effective<'a>(
@@ -137,22 +173,9 @@ impl Representation for Gmm {
         effective(&lobes.lobes, lobe, planar_cosine)
     }
 
-    fn shader(&self) -> Shader {
-        Shader::new(&[include_str!("gmm.wgsl"), include_str!("mixture.wgsl")])
-            .constant("PRINTED", self.printed)
-    }
-
-    fn isotropic(&self, lobes: &GaussianMixture) -> Option<(Cosine, Vec<NormalLobe>)> {
-        Some((planar_cosine, lobes.lobes.clone()))
-    }
-
     fn evaluator<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
         let lobes = |channels: &[f32]| self.lobes(&self.unpack(channels));
         Box::new(MixtureEvaluator { lobes, cosine: planar_cosine, lobe, directions })
-    }
-
-    fn fit(&self) -> Option<Fit> {
-        Some(self.fit)
     }
 
     /// From `alpha (2 sigma² + |mu|²)` to what the paper stores.

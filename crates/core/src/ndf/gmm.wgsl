@@ -5,7 +5,8 @@ const NORMALISED: bool = true;
 // Share of a texel's weight below which a lobe says nothing.
 const DEAD: f32 = 1e-5;
 
-fn decode_lobe(sums: vec4<f32>) -> NormalLobe {
+fn decode_lobe(channels: ptr<function, Channels>, layer: u32) -> NormalLobe {
+    let sums = (*channels)[layer];
     let alpha = sums.x;
     if !(alpha > DEAD) {
         return NormalLobe(vec3<f32>(0.0), 0.0, 0.0);

@@ -13,6 +13,7 @@
 
 use glam::{DMat2, DVec2, DVec3};
 
+use super::reflect::Answer;
 use super::slopes::{SlopeGaussian, mahalanobis, root_of_determinant};
 use super::{FilteredTexel, IncidentLight};
 use crate::brdf::{Brdf, Directions, Lobe, ShadingModel};
@@ -260,17 +261,18 @@ fn diffuse(brdf: &Brdf, g: &SlopeGaussian, grid: &SlopeGrid, directions: &Direct
 
 /// Light that a filtered texel of a displaced surface sends to the eye.
 pub(super) fn reflect(
-    (g, grid): (&SlopeGaussian, &SlopeGrid),
+    g: &SlopeGaussian,
+    grid: &SlopeGrid,
     texel: &FilteredTexel<'_>,
-    brdf: &Brdf,
     lights: &[IncidentLight],
 ) -> DVec3 {
+    let brdf = &texel.prepared.brdf;
     let params = (texel.params)(None);
     let spread = g.widen(brdf.width(params.roughness));
     let of = |IncidentLight { directions, irradiance }: &IncidentLight| {
         let specular = if brdf.is_specular() { specular(brdf, &spread, texel, directions) } else { 0.0 };
-        let parts = (specular, diffuse(brdf, g, grid, directions));
-        *irradiance * super::reflect::combine(brdf, &params, directions, parts)
+        let answer = Answer { specular, diffuse: diffuse(brdf, g, grid, directions) };
+        *irradiance * answer.coloured(brdf, &params, directions)
     };
     lights.iter().map(of).sum()
 }
@@ -278,7 +280,9 @@ pub(super) fn reflect(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf;
+
+    use crate::brdf::AnyLobe;
+    use crate::ndf::AnyMethod;
     use crate::sphere::gauss_legendre;
     use crate::units::SlopeVariance;
     use rand::{RngExt, SeedableRng};
@@ -323,7 +327,7 @@ mod tests {
         // ∫ max(n·wo, 0) D(n) dn / (1 + Lambda(wo)) is the projected area of the mean normal. The kink of the maximum costs the quadrature
         // some 1e-6, which a small area magnifies to at most 1e-4: asked for.
         let mut random = Pcg64Mcg::seed_from_u64(6);
-        let lobe = brdf::parse("beckmann:0.05").unwrap();
+        let lobe = "beckmann:0.05".parse::<AnyLobe>().unwrap();
         let base = lobe.slope_variance().unwrap();
         let mut tried = 0;
         while tried < 60 {
@@ -348,7 +352,7 @@ mod tests {
         // GGX has tails: within nine deviations of its Gaussian namesake lie all but 1.2 % of its facets, which lean far.
         let mut random = Pcg64Mcg::seed_from_u64(7);
         for (spelling, tolerance) in [("beckmann:0.3", 1e-5), ("ggx:0.3", 0.1)] {
-            let lobe = brdf::parse(spelling).unwrap();
+            let lobe = spelling.parse::<AnyLobe>().unwrap();
             for _ in 0..20 {
                 let g = gaussian(&mut random).widen(lobe.slope_variance().unwrap());
                 let w = unit(&mut random);
@@ -362,7 +366,7 @@ mod tests {
     #[test]
     fn ggx_area_is_its_integral() {
         // Slopes seen along a plane have the density a²/(2 (a² + s²)^1.5), Student's t of two degrees.
-        let lobe = brdf::parse("ggx:0.5").unwrap();
+        let lobe = "ggx:0.5".parse::<AnyLobe>().unwrap();
         let deviation: f64 = 0.4;
         let a2 = 2.0 * deviation * deviation;
         for mean in [-1.0, -0.2, 0.0, 0.3, 1.5_f64] {
@@ -387,7 +391,7 @@ mod tests {
             specular: DVec3::splat(0.04),
             roughness: SlopeVariance::ZERO,
         };
-        let method = super::super::parse("slopes").unwrap();
+        let method = "slopes".parse::<AnyMethod>().unwrap();
         let prepared = method.prepare(brdf, SlopeVariance::ZERO);
         let filtered = FilteredTexel {
             channels: &[],
@@ -397,9 +401,9 @@ mod tests {
             slope_map: Some(DMat2::IDENTITY),
         };
         reflect(
-            (texel.0, &SlopeGrid::new(texel.1)),
+            texel.0,
+            &SlopeGrid::new(texel.1),
             &filtered,
-            brdf,
             &[IncidentLight { directions, irradiance: DVec3::ONE }],
         )
     }
@@ -408,7 +412,7 @@ mod tests {
     fn a_flat_surface_is_its_own_facet() {
         for shading in [ShadingModel::Masked, ShadingModel::Shadowed] {
             for lobe in ["beckmann:0.3", "ggx:0.3"] {
-                let brdf = Brdf { lobe: brdf::parse(lobe).unwrap(), shading };
+                let brdf = Brdf { lobe: lobe.parse::<AnyLobe>().unwrap(), shading };
                 let flat = SlopeGaussian { height: 0.0, mean: DVec2::ZERO, covariance: [0.0; 3] };
                 let directions = Directions::new(
                     DVec3::new(0.5, 0.1, 0.5).normalize(),
@@ -450,7 +454,7 @@ mod tests {
             let Some(directions) = Directions::between(unit(&mut random), wo) else { continue };
             for shading in [ShadingModel::Masked, ShadingModel::Shadowed] {
                 for lobe in ["beckmann:0.02", "beckmann:0.5", "ggx:0.1", "lambert"] {
-                    let brdf = Brdf { lobe: brdf::parse(lobe).unwrap(), shading };
+                    let brdf = Brdf { lobe: lobe.parse::<AnyLobe>().unwrap(), shading };
                     let light = lit((&g, 5), &brdf, directions, false);
                     assert!(
                         light.is_finite() && light.min_element() >= 0.0,
@@ -463,7 +467,7 @@ mod tests {
 
     #[test]
     fn the_printed_form_is_ours_where_it_is_defined() {
-        let brdf = Brdf { lobe: brdf::parse("beckmann:0.2").unwrap(), shading: ShadingModel::Shadowed };
+        let brdf = Brdf { lobe: "beckmann:0.2".parse::<AnyLobe>().unwrap(), shading: ShadingModel::Shadowed };
         let g = SlopeGaussian { height: 0.0, mean: DVec2::new(0.1, -0.2), covariance: [0.05, 0.03, 0.01] };
         let directions =
             Directions::new(DVec3::new(0.5, 0.3, 0.8).normalize(), DVec3::new(-0.6, 0.2, 0.4).normalize());

@@ -2,10 +2,12 @@
 
 use glam::DVec3;
 
-use super::Evaluator;
-use crate::brdf::Lobe;
-use crate::fit::{Alignment, Fit, LobeKind, MAX_LOBES};
+use super::table::count_of;
+use super::{Evaluator, ParameterError};
+use crate::brdf::{AnyLobe, Lobe};
+use crate::fit::{Alignment, Fit, MAX_LOBES};
 use crate::units::SlopeVariance;
+use crate::words::UnknownWord;
 
 /// Sums of every lobe: weight, then three statistics times the weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,8 +73,8 @@ impl LobeSums {
 /// A decoded lobe, ready to be shaded: the BRDF widened by `variance`, around `mean`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalLobe {
-    /// Its layer.
-    pub layer: usize,
+    /// Its number among the lobes of the texel.
+    pub index: usize,
     /// Share of the texel; they sum to one.
     pub weight: f64,
     /// Mean direction; for planar lobes `(x, y, 0)`.
@@ -84,7 +86,7 @@ pub struct NormalLobe {
 impl NormalLobe {
     /// A lobe that is all of a texel.
     pub(super) fn alone(mean: DVec3, variance: SlopeVariance) -> Self {
-        Self { layer: 0, weight: 1.0, mean, variance }
+        Self { index: 0, weight: 1.0, mean, variance }
     }
 
     /// The unit direction of the mean: on the sphere the mean itself; a planar mean, whose z is 0, is lifted to it.
@@ -109,18 +111,11 @@ pub(super) fn mean_of(lobes: &[NormalLobe]) -> DVec3 {
 /// Reads `J[:ALIGNMENT][:WORD]`; the second result says whether the word was there.
 pub(super) fn parse_mixture(
     words: &[&str],
-    kind: LobeKind,
+    fit: impl Fn(usize) -> Result<Fit, ParameterError>,
     word: &str,
-    name: &str,
-) -> Result<(Fit, bool), String> {
-    let count =
-        || format!("the number of lobes must be a whole number from 1 to {MAX_LOBES}, as in `{name}:4`");
-    let (lobes, rest) = words.split_first().ok_or_else(count)?;
-    let lobes = match lobes.parse() {
-        Ok(n @ 1..=MAX_LOBES) => n,
-        _ => return Err(count()),
-    };
-    let mut fit = Fit { kind, lobes, alignment: Alignment::default() };
+) -> Result<(Fit, bool), ParameterError> {
+    let mut fit = fit(count_of(words.first()))?;
+    let rest = words.get(1..).unwrap_or_default();
     let (rest, flag) = match rest.split_last() {
         Some((last, rest)) if *last == word => (rest, true),
         _ => (rest, false),
@@ -128,13 +123,15 @@ pub(super) fn parse_mixture(
     match rest {
         [] => {}
         [alignment] => {
-            let known = Alignment::ALL.iter().find(|a| a.name() == *alignment);
-            fit.alignment = *known.ok_or_else(|| {
-                let names: Vec<&str> = Alignment::ALL.iter().map(|a| a.name()).collect();
-                format!("`{alignment}` is no alignment; there are {}, and then `{word}`", names.join(", "))
+            fit.alignment = alignment.parse().map_err(|e: UnknownWord| {
+                let said = format!("`{alignment}` is no alignment; there are {}, and then `{word}`", e.known);
+                ParameterError::Words(said)
             })?;
         }
-        _ => return Err(format!("takes the number of lobes, an alignment and `{word}`, no more")),
+        _ => {
+            let said = format!("takes the number of lobes, an alignment and `{word}`, no more");
+            return Err(ParameterError::Words(said));
+        }
     }
     Ok((fit, flag))
 }
@@ -165,7 +162,7 @@ pub(super) fn effective<'a>(
     lobe: &'a dyn Lobe,
     cosine: Cosine,
 ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-    let widened: Vec<(f64, DVec3, Box<dyn Lobe>)> =
+    let widened: Vec<(f64, DVec3, AnyLobe)> =
         lobes.iter().map(|l| (l.weight, l.mean, lobe.widen(l.variance))).collect();
     Box::new(move |w| widened.iter().map(|(weight, mu, lobe)| weight * lobe.evaluate(cosine(w, *mu))).sum())
 }

@@ -1,20 +1,20 @@
-// Shading methods whose texels are sums of isotropic lobes. Twin of `reflect` in reflect.rs, for those that have `isotropic`.
+// Shading methods whose texels are sums of isotropic lobes. Twin of `reflect` in reflect.rs, for the form `Lobes`.
 //
-// A method brings `decode_lobe` (one layer to a lobe, of weight 0 where it says nothing), `cosine`, and NORMALISED.
+// A method brings `decode_lobe` (LAYERS_EACH layers to a lobe, from its first, of weight 0 where it says nothing), `cosine`, and NORMALISED.
 
-alias Decoded = array<NormalLobe, LAYERS>;
+alias Decoded = array<NormalLobe, LOBES>;
 
 // The lobes that a texel's channels stand for.
 fn decode(channels: ptr<function, Channels>) -> Decoded {
     var lobes: Decoded;
     var total = 0.0;
-    for (var j = 0u; j < LAYERS; j++) {
-        lobes[j] = decode_lobe((*channels)[j]);
+    for (var j = 0u; j < LOBES; j++) {
+        lobes[j] = decode_lobe(channels, j * LAYERS_EACH);
         total += lobes[j].weight;
     }
     if NORMALISED {
         let share = select(0.0, 1.0 / total, total > 0.0);
-        for (var j = 0u; j < LAYERS; j++) {
+        for (var j = 0u; j < LOBES; j++) {
             lobes[j].weight *= share;
         }
     }
@@ -37,7 +37,7 @@ fn reflect_texel(
     directions: Directions,
 ) -> vec3<f32> {
     var sum = vec3<f32>(0.0);
-    for (var j = 0u; j < LAYERS; j++) {
+    for (var j = 0u; j < LOBES; j++) {
         let lobe = (*lobes)[j];
         if lobe.weight == 0.0 {
             continue;

@@ -9,7 +9,7 @@ fn reflect_environment(
     local: LocalEnvironment,
 ) -> vec3<f32> {
     var sum = vec3<f32>(0.0);
-    for (var j = 0u; j < LAYERS; j++) {
+    for (var j = 0u; j < LOBES; j++) {
         let lobe = (*lobes)[j];
         if lobe.weight != 0.0 {
             sum += lobe.weight * lobe_light(direction(lobe), lobe.variance, params_of(channels, j, plain), brdf, local);

@@ -3,16 +3,21 @@
 //! "Normalised MIP-mapping" of Han et al. 2007, figure 2. It keeps the direction and forgets the spread,
 //! so highlights stay as sharp as on the finest level.
 
+use std::fmt::{self, Display};
+
 use glam::{DVec3, Vec3};
 
-use super::mixture::{Cosine, NormalLobe, cosine};
-use super::{Decoded, Representation, Row, Sample, direction_or_up, no_parameters};
+use super::mixture::{NormalLobe, cosine};
+use super::{
+    Decoded, Describe, Encoding, Form, FormKind, Representation, Row, Sample, direction_or_up,
+    table::no_parameters,
+};
 use crate::brdf::Lobe;
 use crate::shader::Shader;
 use crate::units::SlopeVariance;
 
 /// Normalised mip-mapping.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Naive;
 
 pub(super) const ROW: Row = Row {
@@ -54,17 +59,29 @@ impl From<UnitMean> for Decoded {
     }
 }
 
+impl Display for Naive {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(ROW.name)
+    }
+}
+
+impl Describe for Naive {
+    fn encoding(&self) -> Encoding {
+        Encoding::MeanNormal
+    }
+
+    fn form_kind(&self) -> FormKind {
+        FormKind::Lobes
+    }
+
+    fn shader(&self) -> Shader {
+        Shader::new(FormKind::Lobes, &[include_str!("naive.wgsl"), include_str!("sphere_cosine.wgsl")])
+    }
+}
+
 impl Representation for Naive {
     type Sums = Vec3;
     type Lobes = UnitMean;
-
-    fn spelling(&self) -> String {
-        ROW.name.to_owned()
-    }
-
-    fn layers(&self) -> usize {
-        1
-    }
 
     fn zero(&self) -> Vec3 {
         Vec3::ZERO
@@ -90,23 +107,11 @@ impl Representation for Naive {
         UnitMean::new(sums.as_dvec3())
     }
 
-    fn mean(&self, lobes: &UnitMean) -> DVec3 {
-        lobes.alone().mean
+    fn form<'a>(&'a self, lobes: &UnitMean) -> Form<'a> {
+        Form::Lobes(vec![lobes.alone()], cosine)
     }
 
     fn effective<'a>(&'a self, lobes: &UnitMean, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         lobes.effective(lobe)
-    }
-
-    fn shader(&self) -> Shader {
-        Shader::new(&[
-            include_str!("naive.wgsl"),
-            include_str!("sphere_cosine.wgsl"),
-            include_str!("mixture.wgsl"),
-        ])
-    }
-
-    fn isotropic(&self, lobes: &UnitMean) -> Option<(Cosine, Vec<NormalLobe>)> {
-        Some((cosine, vec![lobes.alone()]))
     }
 }

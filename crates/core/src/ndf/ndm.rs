@@ -11,22 +11,29 @@
 //! `moments_about_the_pole_keep_their_digits` has the numbers). Lambert is the mean positive part of `w·n` for
 //! that Gaussian.
 
+use std::fmt::{self, Display};
+
 use std::f64::consts::PI;
 
 use glam::{DMat3, DVec2, DVec3};
 
 use super::slopes::stretched;
-use super::{Decoded, FlatLobe, Method, Representation, Row, Sample, direction_or_up};
+use super::{
+    AnyMethod, Decoded, Describe, Encoding, FlatLobe, Form, FormKind, ParameterError, Representation, Row,
+    Sample, direction_or_up,
+};
 use crate::brdf::{Lobe, mean_of_positive_part};
 use crate::shader::Shader;
 use crate::sphere::frame;
 use crate::units::SlopeVariance;
+use crate::words;
 
 /// The generator `g(d)` of the elliptically contoured density.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum NdmKernel {
     /// The BRDF's own profile, `g(d) = f(1 - v d/2) / f(1)`; ours. A flat map gives back the BRDF, and
     /// Blinn-Phong of exponent m is Pearson II of the same m.
+    #[default]
     Profile,
     /// `e^{-d/2}`.
     Gaussian,
@@ -35,9 +42,10 @@ pub enum NdmKernel {
 }
 
 /// How the density is made to integrate to one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum NdmNormalisation {
     /// `1/sqrt|Σ|` and no more: the paper's own pictures.
+    #[default]
     Partial,
     /// Times a factor found by integrating over the sphere when baking, stored in the spare channels
     /// for three roughnesses and interpolated between them, as between texels.
@@ -46,8 +54,12 @@ pub enum NdmNormalisation {
     Plane,
 }
 
+words!(NdmKernel { Profile => "brdf", Gaussian => "gaussian", Pearson => "pearson" });
+
+words!(NdmNormalisation { Partial => "partial", Integrated => "integrated", Plane => "plane" });
+
 /// Normal distribution mapping.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ndm {
     kernel: NdmKernel,
     normalisation: NdmNormalisation,
@@ -72,36 +84,23 @@ pub(super) const ROW: Row = Row {
     ],
 };
 
-fn parse(words: &[&str]) -> Result<Box<dyn Method>, String> {
+fn parse(words: &[&str]) -> Result<AnyMethod, ParameterError> {
     let (mut kernel, mut normalisation) = (None, None);
     for word in words {
-        let named_before = match *word {
-            "brdf" => kernel.replace(NdmKernel::Profile).is_some(),
-            "gaussian" => kernel.replace(NdmKernel::Gaussian).is_some(),
-            "pearson" => kernel.replace(NdmKernel::Pearson).is_some(),
-            "partial" => normalisation.replace(NdmNormalisation::Partial).is_some(),
-            "integrated" => normalisation.replace(NdmNormalisation::Integrated).is_some(),
-            "plane" => normalisation.replace(NdmNormalisation::Plane).is_some(),
-            other => {
-                return Err(format!(
-                    "`{other}` is no kernel (brdf, gaussian, pearson) and no normalisation (partial, integrated, plane)"
-                ));
-            }
+        let named_before = if let Ok(named) = word.parse::<NdmKernel>() {
+            kernel.replace(named).is_some()
+        } else if let Ok(named) = word.parse::<NdmNormalisation>() {
+            normalisation.replace(named).is_some()
+        } else {
+            return Err(ParameterError::Words(format!(
+                "`{word}` is no kernel (brdf, gaussian, pearson) and no normalisation (partial, integrated, plane)"
+            )));
         };
         if named_before {
-            return Err(format!("`{word}` is a second word for the same choice"));
+            return Err(ParameterError::Words(format!("`{word}` is a second word for the same choice")));
         }
     }
-    let ndm = Ndm {
-        kernel: kernel.unwrap_or(NdmKernel::Profile),
-        normalisation: normalisation.unwrap_or(NdmNormalisation::Partial),
-    };
-    if ndm.kernel == NdmKernel::Profile && ndm.normalisation == NdmNormalisation::Integrated {
-        return Err(
-            "factors are integrated before the BRDF is known: name `gaussian` or `pearson`".to_owned()
-        );
-    }
-    Ok(Box::new(ndm))
+    Ndm::new(kernel.unwrap_or_default(), normalisation.unwrap_or_default()).map(AnyMethod::from)
 }
 
 /// What is stored: moments of `p = n - (0,0,1)`, and the normalisation factors.
@@ -241,31 +240,51 @@ fn with_pivots_above(m: DMat3, floor: f64) -> DMat3 {
     outer(c0, d0) + outer(c1, d1) + outer(DVec3::Z, d2)
 }
 
+impl Display for Ndm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(ROW.name)?;
+        if self.kernel != NdmKernel::default() {
+            write!(f, ":{}", self.kernel)?;
+        }
+        if self.normalisation != NdmNormalisation::default() {
+            write!(f, ":{}", self.normalisation)?;
+        }
+        Ok(())
+    }
+}
+
+impl Describe for Ndm {
+    fn encoding(&self) -> Encoding {
+        let factors = (self.normalisation == NdmNormalisation::Integrated).then_some(self.kernel);
+        Encoding::PoleMoments { factors }
+    }
+
+    fn form_kind(&self) -> FormKind {
+        FormKind::Whole
+    }
+
+    fn reads(&self, stored: &Encoding) -> bool {
+        // Factors that it does not want do no harm.
+        let integrated = self.normalisation == NdmNormalisation::Integrated;
+        matches!(stored, Encoding::PoleMoments { .. }) && (!integrated || self.encoding() == *stored)
+    }
+
+    fn shader(&self) -> Shader {
+        let sources =
+            &[include_str!("ndm.wgsl"), include_str!("stretched.wgsl"), include_str!("../sphere.wgsl")];
+        Shader::new(FormKind::Whole, sources)
+            .constant("KERNEL", self.kernel as u32)
+            .constant("NORMALISATION", self.normalisation as u32)
+    }
+
+    fn flat_lobe(&self, _brdf: &dyn Lobe) -> FlatLobe {
+        if self.kernel == NdmKernel::Profile { FlatLobe::Exact } else { FlatLobe::OwnKernel }
+    }
+}
+
 impl Representation for Ndm {
     type Sums = PoleMoments;
     type Lobes = SpaceGaussian;
-
-    fn spelling(&self) -> String {
-        let kernel = match self.kernel {
-            NdmKernel::Profile => "",
-            NdmKernel::Gaussian => ":gaussian",
-            NdmKernel::Pearson => ":pearson",
-        };
-        let normalisation = match self.normalisation {
-            NdmNormalisation::Partial => "",
-            NdmNormalisation::Integrated => ":integrated",
-            NdmNormalisation::Plane => ":plane",
-        };
-        format!("{}{kernel}{normalisation}", ROW.name)
-    }
-
-    fn layers(&self) -> usize {
-        3
-    }
-
-    fn encoding(&self) -> &'static str {
-        "sums-about-pole"
-    }
 
     fn zero(&self) -> PoleMoments {
         PoleMoments { mean: [0.0; 3], second: [0.0; 6], factors: [0.0; 3] }
@@ -319,20 +338,8 @@ impl Representation for Ndm {
         SpaceGaussian { mean: p + DVec3::Z, covariance, factors: sums.factors.map(f64::from) }
     }
 
-    fn mean(&self, lobes: &SpaceGaussian) -> DVec3 {
-        lobes.mean
-    }
-
-    fn shader(&self) -> Shader {
-        let sources = &[
-            include_str!("ndm.wgsl"),
-            include_str!("stretched.wgsl"),
-            include_str!("../sphere.wgsl"),
-            include_str!("whole.wgsl"),
-        ];
-        Shader::new(sources)
-            .constant("KERNEL", self.kernel as u32)
-            .constant("NORMALISATION", self.normalisation as u32)
+    fn form<'a>(&'a self, lobes: &SpaceGaussian) -> Form<'a> {
+        Form::Whole(lobes.mean)
     }
 
     /// The lobe's energy, which kernels of their own shape are scaled to.
@@ -370,13 +377,20 @@ impl Representation for Ndm {
         }
         self.pack(&sums, channels);
     }
-
-    fn flat_lobe(&self, _brdf: &dyn Lobe) -> FlatLobe {
-        if self.kernel == NdmKernel::Profile { FlatLobe::Exact } else { FlatLobe::OwnKernel }
-    }
 }
 
 impl Ndm {
+    /// A density of this kernel and normalisation.
+    ///
+    /// # Errors
+    /// [`ParameterError::UnknownLobe`] for integrated factors of the lobe's own profile, which baking does not know.
+    pub fn new(kernel: NdmKernel, normalisation: NdmNormalisation) -> Result<Self, ParameterError> {
+        if kernel == NdmKernel::Profile && normalisation == NdmNormalisation::Integrated {
+            return Err(ParameterError::UnknownLobe);
+        }
+        Ok(Self { kernel, normalisation })
+    }
+
     /// The effective lobe; `energy` is that of the BRDF, where the kernel is not its own.
     fn effective_of<'a>(
         self,
@@ -462,7 +476,8 @@ impl Ndm {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf;
+
+    use crate::brdf::AnyLobe;
     use crate::pyramid::Precision;
     use crate::sphere::gauss_legendre;
     use glam::Vec3;
@@ -508,7 +523,7 @@ mod tests {
             for (s, tolerance) in
                 [("blinn-phong:8", 1e-4), ("blinn-phong:128", 1e-4), ("blinn-phong:32", 0.06)]
             {
-                let lobe = brdf::parse(s).unwrap();
+                let lobe = s.parse::<AnyLobe>().unwrap();
                 let effective = ndm.effective(&g, &*lobe);
                 let total = integral(&effective);
                 assert!((total - 1.0).abs() < tolerance, "{kernel:?} {s}: {total}");
@@ -520,14 +535,14 @@ mod tests {
     fn partial_normalisation_is_not_one_and_says_so() {
         let ndm = Ndm { kernel: NdmKernel::Gaussian, normalisation: NdmNormalisation::Partial };
         let g = ndm.decode(&sums_of(ndm, &groove()));
-        let lobe = brdf::parse("blinn-phong:128").unwrap();
+        let lobe = "blinn-phong:128".parse::<AnyLobe>().unwrap();
         let total = integral(&ndm.effective(&g, &*lobe));
         assert!((total - 1.0).abs() > 0.02, "{total}");
     }
 
     #[test]
     fn blinn_phong_is_pearson_ii() {
-        let bp = brdf::parse("blinn-phong:8").unwrap();
+        let bp = "blinn-phong:8".parse::<AnyLobe>().unwrap();
         let [own, pearson] = [NdmKernel::Profile, NdmKernel::Pearson]
             .map(|kernel| Ndm { kernel, normalisation: NdmNormalisation::Partial });
         let g = own.decode(&sums_of(own, &groove()));

@@ -3,17 +3,23 @@
 //! A peak holds its weight, direction and exponent. None of these mixes: a filter shades every peak of every texel it
 //! reads, up to 8 J of them, and blends the results (`measure/between.rs`). A peak of exponent s is the BRDF widened by `1/s`.
 
+use std::fmt::{self, Display};
+
 use glam::DVec3;
 
-use super::mixture::{Cosine, LobeSums, MixtureEvaluator, NormalLobe, cosine, effective, mean_of};
-use super::{Decoded, Evaluator, Method, MixtureLobe, Representation, Row, Sample};
+use super::mixture::{LobeSums, MixtureEvaluator, NormalLobe, cosine, effective};
+use super::table::{count_of, counted};
+use super::{
+    AnyMethod, Decoded, Describe, Encoding, Evaluator, Form, FormKind, ParameterError, Representation, Row,
+    Sample, StoredSums,
+};
 use crate::brdf::Lobe;
 use crate::fit::{Alignment, Fit, LobeKind, MAX_LOBES, SHARPEST};
 use crate::shader::Shader;
 use crate::units::SlopeVariance;
 
 /// Phong peaks.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Phong {
     peaks: usize,
 }
@@ -27,15 +33,9 @@ pub(super) const ROW: Row = Row {
     samples: &["phong:4", "phong:1"],
 };
 
-fn parse(words: &[&str]) -> Result<Box<dyn Method>, String> {
-    match words {
-        [peaks] => peaks.parse().ok().filter(|n| (1..=MAX_LOBES).contains(n)),
-        _ => None,
-    }
-    .map(|peaks| Box::new(Phong { peaks }) as Box<dyn Method>)
-    .ok_or_else(|| {
-        format!("the number of peaks must be a whole number from 1 to {MAX_LOBES}, as in `phong:4`")
-    })
+fn parse(words: &[&str]) -> Result<AnyMethod, ParameterError> {
+    let [peaks] = words else { return Phong::new(0).map(AnyMethod::from) };
+    Phong::new(count_of(Some(peaks))).map(AnyMethod::from)
 }
 
 /// The peaks of a texel.
@@ -47,19 +47,21 @@ pub struct PhongPeaks {
 
 impl From<PhongPeaks> for Decoded {
     fn from(peaks: PhongPeaks) -> Self {
-        let peak = |p: &NormalLobe| MixtureLobe {
-            layer: p.layer,
-            weight: p.weight,
-            mean: p.mean,
-            variance: p.variance.get(),
-        };
-        Self::Peaks(peaks.peaks.iter().map(peak).collect())
+        Self::Peaks(peaks.peaks)
     }
 }
 
 impl Phong {
+    /// This many peaks a texel, 1 to [`MAX_LOBES`].
+    ///
+    /// # Errors
+    /// [`ParameterError::Count`] for another number.
+    pub fn new(peaks: usize) -> Result<Self, ParameterError> {
+        counted(peaks, "number of peaks", 1..=MAX_LOBES, "phong:4").map(|peaks| Self { peaks })
+    }
+
     fn peaks(sums: &LobeSums) -> Vec<NormalLobe> {
-        let peak = |(layer, &[weight, x, y, exponent]): (usize, &[f32; 4])| {
+        let peak = |(index, &[weight, x, y, exponent]): (usize, &[f32; 4])| {
             // Held to the disk and to exponents that mean something, whatever a damaged file holds.
             let (x, y) = (f64::from(x), f64::from(y));
             let held = x.hypot(y).max(1.0);
@@ -67,27 +69,44 @@ impl Phong {
             let mean = DVec3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt());
             let variance =
                 if exponent < SHARPEST * 0.999 { 1.0 / f64::from(exponent.max(1e-2)) } else { 0.0 };
-            NormalLobe { layer, weight: f64::from(weight), mean, variance: SlopeVariance::clamped(variance) }
+            NormalLobe { index, weight: f64::from(weight), mean, variance: SlopeVariance::clamped(variance) }
         };
         sums.alive().map(peak).collect()
+    }
+}
+
+impl Display for Phong {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", ROW.name, self.peaks)
+    }
+}
+
+impl Describe for Phong {
+    fn encoding(&self) -> Encoding {
+        Encoding::Lobes { kind: LobeKind::Peaks, count: self.peaks, sums: StoredSums::Plain }
+    }
+
+    fn form_kind(&self) -> FormKind {
+        FormKind::Lobes
+    }
+
+    fn shader(&self) -> Shader {
+        Shader::new(FormKind::Lobes, &[include_str!("phong.wgsl"), include_str!("sphere_cosine.wgsl")])
+            .constant("SHARPEST", SHARPEST)
+    }
+
+    fn fit(&self) -> Option<Fit> {
+        Some(Fit { kind: LobeKind::Peaks, lobes: self.peaks, alignment: Alignment::Unaligned })
+    }
+
+    fn filterable(&self) -> bool {
+        false
     }
 }
 
 impl Representation for Phong {
     type Sums = LobeSums;
     type Lobes = PhongPeaks;
-
-    fn spelling(&self) -> String {
-        format!("{}:{}", ROW.name, self.peaks)
-    }
-
-    fn layers(&self) -> usize {
-        self.peaks
-    }
-
-    fn encoding(&self) -> &'static str {
-        "peaks"
-    }
 
     fn zero(&self) -> LobeSums {
         LobeSums::zero(self.peaks)
@@ -114,37 +133,16 @@ impl Representation for Phong {
         PhongPeaks { peaks: Self::peaks(sums) }
     }
 
-    fn mean(&self, lobes: &PhongPeaks) -> DVec3 {
-        mean_of(&lobes.peaks)
+    fn form<'a>(&'a self, lobes: &PhongPeaks) -> Form<'a> {
+        Form::Lobes(lobes.peaks.clone(), cosine)
     }
 
     fn effective<'a>(&'a self, peaks: &PhongPeaks, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         effective(&peaks.peaks, lobe, cosine)
     }
 
-    fn shader(&self) -> Shader {
-        Shader::new(&[
-            include_str!("phong.wgsl"),
-            include_str!("sphere_cosine.wgsl"),
-            include_str!("mixture.wgsl"),
-        ])
-        .constant("SHARPEST", SHARPEST)
-    }
-
-    fn isotropic(&self, lobes: &PhongPeaks) -> Option<(Cosine, Vec<NormalLobe>)> {
-        Some((cosine, lobes.peaks.clone()))
-    }
-
     fn evaluator<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
         let lobes = |channels: &[f32]| Self::peaks(&self.unpack(channels));
         Box::new(MixtureEvaluator { lobes, cosine, lobe, directions })
-    }
-
-    fn fit(&self) -> Option<Fit> {
-        Some(Fit { kind: LobeKind::Peaks, lobes: self.peaks, alignment: Alignment::Unaligned })
-    }
-
-    fn filterable(&self) -> bool {
-        false
     }
 }

@@ -5,7 +5,8 @@ const NORMALISED: bool = false;
 // Weight below which a peak says nothing.
 const DEAD: f32 = 1e-5;
 
-fn decode_lobe(sums: vec4<f32>) -> NormalLobe {
+fn decode_lobe(channels: ptr<function, Channels>, layer: u32) -> NormalLobe {
+    let sums = (*channels)[layer];
     if !(sums.x > DEAD) {
         return NormalLobe(vec3<f32>(0.0, 0.0, 1.0), 0.0, 0.0);
     }

@@ -8,8 +8,8 @@ use std::f64::consts::PI;
 
 use glam::{DMat2, DVec3};
 
-use super::{NormalLobe, Representation, direction_or_up, leadr};
-use crate::brdf::{Brdf, Directions, Lambert, Lobe, SurfaceParams};
+use super::{Cosine, Form, NormalLobe, Representation, leadr};
+use crate::brdf::{AnyLobe, Brdf, Directions, Lambert, SurfaceParams, Widen};
 use crate::units::SlopeVariance;
 
 /// A light's way to the eye, and its irradiance on a plane that faces it, in linear RGB.
@@ -23,12 +23,24 @@ pub struct IncidentLight {
 
 /// What shading wants to know of a material, made once by [`super::Method::prepare`].
 pub struct PreparedBrdf {
+    /// The material's BRDF.
+    pub(super) brdf: Brdf,
     /// The roughness it is made for.
     pub(super) roughness: SlopeVariance,
     /// The lobe widened by it.
-    pub(super) lobe: Box<dyn Lobe>,
-    /// The method's tables for that lobe and for the diffuse one.
-    pub(super) tables: [Vec<f64>; 2],
+    pub(super) lobe: AnyLobe,
+    /// The method's numbers for that lobe.
+    pub(super) table: Vec<f64>,
+    /// The method's numbers for the diffuse lobe.
+    pub(super) diffuse_table: Vec<f64>,
+}
+
+impl PreparedBrdf {
+    /// The BRDF that was prepared.
+    #[must_use]
+    pub fn brdf(&self) -> &Brdf {
+        &self.brdf
+    }
 }
 
 /// A filtered texel.
@@ -36,7 +48,7 @@ pub struct PreparedBrdf {
 pub struct FilteredTexel<'a> {
     /// Channels as filtered, four a layer.
     pub channels: &'a [f32],
-    /// What it is made of: in the layer of a lobe, or (`None`) over all.
+    /// What it is made of: under one of its lobes, or (`None`) over all.
     pub params: &'a dyn Fn(Option<usize>) -> SurfaceParams,
     /// What was prepared for the material.
     pub prepared: &'a PreparedBrdf,
@@ -47,49 +59,68 @@ pub struct FilteredTexel<'a> {
 }
 
 /// Light that a filtered texel sends to the eye.
-pub(super) fn reflect<R: Representation + ?Sized>(
+pub(super) fn reflect<R: Representation>(
     representation: &R,
     texel: &FilteredTexel<'_>,
-    brdf: &Brdf,
     lights: &[IncidentLight],
 ) -> DVec3 {
     let decoded = representation.decode(&representation.unpack(texel.channels));
-    if let (Some(by), Some((slopes, grid))) = (texel.slope_map, representation.displaced(&decoded)) {
-        return leadr::reflect((&slopes.stretched(by), grid), texel, brdf, lights);
+    let form = representation.form(&decoded);
+    match (&form, texel.slope_map) {
+        (Form::Slopes(slopes, grid), Some(by)) => leadr::reflect(&slopes.stretched(by), grid, texel, lights),
+        (Form::Lobes(lobes, cosine), _) => of_lobes(lobes, *cosine, texel, lights),
+        (Form::Slopes(..) | Form::Whole(_), _) => {
+            of_whole(representation, &decoded, &form.whole(), texel, lights)
+        }
     }
-    let Some((cosine, lobes)) = representation.isotropic(&decoded) else {
-        let params = (texel.params)(None);
-        let PreparedBrdf { roughness, lobe, tables: [table, diffuse_table] } = texel.prepared;
-        // Where a roughness map says something else than what was prepared for, the lobe is made anew.
-        let own = (params.roughness != *roughness).then(|| brdf.lobe.widen(params.roughness));
-        let lobe = match &own {
-            Some(own) => representation.effective(&decoded, &**own),
-            None => representation.effective_with(&decoded, &**lobe, table),
-        };
-        let diffuse = representation.effective_with(&decoded, &Lambert::SHARP, diffuse_table);
-        let width = brdf.width(params.roughness);
-        let mean = representation.mean(&decoded);
-        let length = mean.length().clamp(1e-3, 1.0);
-        let whole = NormalLobe::alone(direction_or_up(mean), SlopeVariance::clamped((1.0 - length) / length));
-        let of = |light: &IncidentLight| {
-            let specular = if brdf.is_specular() {
-                let n = if texel.at_means {
-                    whole.mean
-                } else {
-                    responding_normal(&whole, whole.mean, width, light.directions.wh)
-                };
-                lobe(light.directions.wh) * brdf.factor(n, &light.directions, params.roughness)
-            } else {
-                0.0
-            };
-            light.irradiance
-                * combine(brdf, &params, &light.directions, (specular, diffuse(light.directions.wi)))
-        };
-        return lights.iter().map(of).sum();
+}
+
+/// Light of one distribution, through its effective lobe; `whole` is the isotropic lobe of normals most like it.
+fn of_whole<R: Representation>(
+    representation: &R,
+    decoded: &R::Lobes,
+    whole: &NormalLobe,
+    texel: &FilteredTexel<'_>,
+    lights: &[IncidentLight],
+) -> DVec3 {
+    let params = (texel.params)(None);
+    let PreparedBrdf { brdf, roughness, lobe, table, diffuse_table } = texel.prepared;
+    // Where a roughness map says something else than what was prepared for, the lobe is made anew.
+    let own = (params.roughness != *roughness).then(|| brdf.lobe.widen(params.roughness));
+    let lobe = match &own {
+        Some(own) => representation.effective(decoded, &**own),
+        None => representation.effective_with(decoded, &**lobe, table),
     };
+    let diffuse = representation.effective_with(decoded, &Lambert::SHARP, diffuse_table);
+    let width = brdf.width(params.roughness);
+    let of = |light: &IncidentLight| {
+        let specular = if brdf.is_specular() {
+            let n = if texel.at_means {
+                whole.mean
+            } else {
+                responding_normal(whole, whole.mean, width, light.directions.wh)
+            };
+            lobe(light.directions.wh) * brdf.factor(n, &light.directions, params.roughness)
+        } else {
+            0.0
+        };
+        let answer = Answer { specular, diffuse: diffuse(light.directions.wi) };
+        light.irradiance * answer.coloured(brdf, &params, &light.directions)
+    };
+    lights.iter().map(of).sum()
+}
+
+/// Light of a sum of isotropic lobes, each shaded by itself.
+fn of_lobes(
+    lobes: &[NormalLobe],
+    cosine: Cosine,
+    texel: &FilteredTexel<'_>,
+    lights: &[IncidentLight],
+) -> DVec3 {
+    let brdf = &texel.prepared.brdf;
     let mut sum = DVec3::ZERO;
-    for lobe in &lobes {
-        let params = (texel.params)(Some(lobe.layer));
+    for lobe in lobes {
+        let params = (texel.params)(Some(lobe.index));
         let (mu, base) = (lobe.direction(), brdf.width(params.roughness));
         let widening = lobe.variance.widen(params.roughness);
         for IncidentLight { directions, irradiance } in lights {
@@ -104,8 +135,9 @@ pub(super) fn reflect<R: Representation + ?Sized>(
             } else {
                 0.0
             };
-            let diffuse = Lambert::SHARP.evaluate_widened(lobe.variance, directions.wi.dot(mu));
-            sum += *irradiance * lobe.weight * combine(brdf, &params, directions, (specular, diffuse));
+            let diffuse = Lambert::SHARP.value_widened(lobe.variance, directions.wi.dot(mu));
+            let answer = Answer { specular, diffuse };
+            sum += *irradiance * lobe.weight * answer.coloured(brdf, &params, directions);
         }
     }
     sum
@@ -116,27 +148,32 @@ pub(super) fn responding_normal(lobe: &NormalLobe, mu: DVec3, base: SlopeVarianc
     (mu * base.get() + wh * lobe.variance.get()).try_normalize().unwrap_or(mu)
 }
 
-/// Puts colours on the specular and the diffuse part.
-pub(super) fn combine(
-    brdf: &Brdf,
-    params: &SurfaceParams,
-    directions: &Directions,
-    (specular, diffuse): (f64, f64),
-) -> DVec3 {
-    let diffuse = params.diffuse * (diffuse.max(0.0) / PI);
-    if !brdf.is_specular() {
-        return diffuse;
+/// Light of a texel before colour: what facets reflect, Fresnel's term apart, and the mean cosine to the light.
+pub(super) struct Answer {
+    pub(super) specular: f64,
+    pub(super) diffuse: f64,
+}
+
+impl Answer {
+    /// Colours on both parts.
+    pub(super) fn coloured(&self, brdf: &Brdf, params: &SurfaceParams, directions: &Directions) -> DVec3 {
+        let diffuse = params.diffuse * (self.diffuse.max(0.0) / PI);
+        if !brdf.is_specular() {
+            return diffuse;
+        }
+        let fresnel = brdf.shading.fresnel(params.specular, directions.u);
+        brdf.lobe.tint(directions.u) * fresnel * self.specular.max(0.0)
+            + brdf.shading.diffuse_share(fresnel) * diffuse
     }
-    let fresnel = brdf.shading.fresnel(params.specular, directions.u);
-    brdf.lobe.tint(directions.u) * fresnel * specular.max(0.0) + brdf.shading.diffuse_share(fresnel) * diffuse
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf;
+
     use crate::brdf::ShadingModel;
-    use crate::ndf;
+
+    use crate::ndf::AnyMethod;
     use glam::Vec3;
 
     /// Normals of a Gaussian of slopes on an even lattice, some 30 degrees wide.
@@ -159,9 +196,9 @@ mod tests {
         let params =
             SurfaceParams { diffuse: DVec3::ZERO, specular: DVec3::ONE, roughness: SlopeVariance::ZERO };
         for shading in ShadingModel::ALL {
-            let brdf = Brdf { lobe: brdf::parse("blinn-phong:200").unwrap(), shading };
+            let brdf = Brdf { lobe: "blinn-phong:200".parse::<AnyLobe>().unwrap(), shading };
             for method in ["vmf:1", "slopes"] {
-                let method = ndf::parse(method).unwrap();
+                let method = method.parse::<AnyMethod>().unwrap();
                 let mut channels = vec![0.0; 4 * method.layers()];
                 let row = |n: &Vec3| {
                     let mut row = crate::surface::SurfaceRow::flat(1);
@@ -195,14 +232,14 @@ mod tests {
                             slope_map: None,
                         };
                         let lit = IncidentLight { directions, irradiance: DVec3::ONE };
-                        method.reflect(&texel, &brdf, &[lit]).x
+                        method.reflect(&texel, &[lit]).x
                     };
                     // The method's own lobe is the same in both; the mean of these normals is the vertical.
                     let at_mean = brdf.factor(DVec3::Z, &directions, params.roughness);
                     faithful += (at_mean - exact).powi(2);
                     ours += (at_mean * by(false) / by(true) - exact).powi(2);
                 }
-                assert!(ours < 0.1 * faithful, "{shading:?} {}: {ours} {faithful}", method.spelling());
+                assert!(ours < 0.1 * faithful, "{shading:?} {}: {ours} {faithful}", method);
             }
         }
     }

@@ -1,6 +1,6 @@
 // Shading a filtered texel, what all methods share. Twin of reflect.rs.
 
-// A texel's channels: the method's LAYERS, then, for lobes that carry them, ATTRIBUTES times as many of colours.
+// A texel's channels: the method's LAYERS, then, for LOBES that carry them, ATTRIBUTES times as many of colours.
 alias Channels = array<vec4<f32>, ALL_LAYERS>;
 
 // A lobe ready to be shaded: the BRDF widened by `variance`, around `mean`.
@@ -36,17 +36,17 @@ fn combine(brdf: Brdf, params: SurfaceParams, directions: Directions, specular: 
     return lobe_tint(directions.u) * f * max(specular, 0.0) + diffuse_share(brdf.shading, f) * lambert;
 }
 
-// What a layer's lobe is made of: what it carries, or `plain` where lobes carry nothing.
-fn params_of(channels: ptr<function, Channels>, layer: u32, plain: SurfaceParams) -> SurfaceParams {
+// What a lobe is made of: what it carries, or `plain` where lobes carry nothing.
+fn params_of(channels: ptr<function, Channels>, lobe: u32, plain: SurfaceParams) -> SurfaceParams {
     var params = plain;
     if ATTRIBUTES > 0u {
         // A lobe's attributes are stored times its weight.
-        let share = 1.0 / max((*channels)[layer].x, 1e-30);
-        let first = (*channels)[min(LAYERS + layer, ALL_LAYERS - 1u)] * share;
+        let share = 1.0 / max((*channels)[lobe * LAYERS_EACH].x, 1e-30);
+        let first = (*channels)[min(LAYERS + lobe, ALL_LAYERS - 1u)] * share;
         params.diffuse = first.xyz;
         params.roughness = max(first.w, 0.0);
         if ATTRIBUTES > 1u {
-            params.specular = (*channels)[min(2u * LAYERS + layer, ALL_LAYERS - 1u)].xyz * share;
+            params.specular = (*channels)[min(LAYERS + LOBES + lobe, ALL_LAYERS - 1u)].xyz * share;
         }
     }
     return params;

@@ -4,17 +4,23 @@
 //! lobe's zonal coefficients `rho_l`. What rings below zero is clamped to zero. `sh:L:printed` uses the
 //! paper's `exp` approximations of `rho_l` in place of the exact ones, to show the difference.
 
+use std::fmt::{self, Display};
+
 use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::{Decoded, Evaluator, FlatLobe, Method, Representation, Row, Sample};
+use super::table::{count_of, counted};
+use super::{
+    AnyMethod, Decoded, Describe, Encoding, Evaluator, FlatLobe, Form, FormKind, ParameterError,
+    Representation, Row, Sample,
+};
 use crate::brdf::Lobe;
 use crate::shader::Shader;
 use crate::sphere::{MAX_SH_ORDER, sh_count, spherical_harmonics};
 
 /// Spherical harmonics up to an order.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sh {
     order: usize,
     printed: bool,
@@ -29,17 +35,14 @@ pub(super) const ROW: Row = Row {
     samples: &["sh:2", "sh:4", "sh:7", "sh:16", "sh:7:printed"],
 };
 
-fn parse(words: &[&str]) -> Result<Box<dyn Method>, String> {
-    let range = format!("the order must be a whole number from 2 to {MAX_SH_ORDER}, as in `sh:7`");
+fn parse(words: &[&str]) -> Result<AnyMethod, ParameterError> {
     let (order, printed) = match words {
-        [order] => (order, false),
-        [order, "printed"] => (order, true),
-        _ => return Err(range),
+        [order] => (count_of(Some(order)), false),
+        [order, "printed"] => (count_of(Some(order)), true),
+        _ => (0, false),
     };
-    match order.parse() {
-        Ok(order @ 2..=MAX_SH_ORDER) => Ok(Box::new(Sh { order, printed })),
-        _ => Err(range),
-    }
+    let sh = Sh::new(order)?;
+    Ok(AnyMethod::from(if printed { sh.printed() } else { sh }))
 }
 
 /// Room for every coefficient of the highest order, so that a texel needs no heap.
@@ -56,6 +59,20 @@ impl From<Coefficients> for Decoded {
 }
 
 impl Sh {
+    /// Harmonics up to this order, 2 to [`MAX_SH_ORDER`].
+    ///
+    /// # Errors
+    /// [`ParameterError::Count`] for another order.
+    pub fn new(order: usize) -> Result<Self, ParameterError> {
+        counted(order, "order", 2..=MAX_SH_ORDER, "sh:7").map(|order| Self { order, printed: false })
+    }
+
+    /// The same, with the paper's approximations of a lobe's zonal coefficients.
+    #[must_use]
+    pub fn printed(self) -> Self {
+        Self { printed: true, ..self }
+    }
+
     fn zonal(&self, lobe: &dyn Lobe) -> Vec<f64> {
         let printed = if self.printed { lobe.zonal_as_printed(self.order) } else { None };
         printed.unwrap_or_else(|| lobe.zonal(self.order))
@@ -91,17 +108,39 @@ impl Evaluator for ShEvaluator {
     }
 }
 
+impl Display for Sh {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}{}", ROW.name, self.order, if self.printed { ":printed" } else { "" })
+    }
+}
+
+impl Describe for Sh {
+    fn encoding(&self) -> Encoding {
+        Encoding::Harmonics { order: self.order }
+    }
+
+    fn form_kind(&self) -> FormKind {
+        FormKind::Whole
+    }
+
+    fn reads(&self, stored: &Encoding) -> bool {
+        // Lower orders come first.
+        matches!(stored, Encoding::Harmonics { order } if *order >= self.order)
+    }
+
+    fn shader(&self) -> Shader {
+        let sources = &[include_str!("sh.wgsl"), include_str!("../sphere.wgsl")];
+        Shader::new(FormKind::Whole, sources).constant("ORDER", self.order as u32).table(self.order + 1)
+    }
+
+    fn flat_lobe(&self, _brdf: &dyn Lobe) -> FlatLobe {
+        FlatLobe::BandLimited(self.order)
+    }
+}
+
 impl Representation for Sh {
     type Sums = Coefficients;
     type Lobes = Coefficients;
-
-    fn spelling(&self) -> String {
-        format!("{}:{}{}", ROW.name, self.order, if self.printed { ":printed" } else { "" })
-    }
-
-    fn layers(&self) -> usize {
-        sh_count(self.order).div_ceil(4)
-    }
 
     fn zero(&self) -> Coefficients {
         Coefficients { gamma: [0.0; sh_count(MAX_SH_ORDER)], count: sh_count(self.order) }
@@ -136,10 +175,10 @@ impl Representation for Sh {
         *sums
     }
 
-    /// `Y_1 = sqrt(3/4 pi) (y, z, x)`.
-    fn mean(&self, lobes: &Coefficients) -> DVec3 {
+    fn form<'a>(&'a self, lobes: &Coefficients) -> Form<'a> {
+        // Y_1 = sqrt(3/4 pi) (y, z, x).
         let [_, y, z, x, ..] = lobes.gamma;
-        DVec3::new(x.into(), y.into(), z.into()) * (4.0 * PI / 3.0).sqrt()
+        Form::Whole(DVec3::new(x.into(), y.into(), z.into()) * (4.0 * PI / 3.0).sqrt())
     }
 
     fn table(&self, lobe: &dyn Lobe) -> Vec<f64> {
@@ -156,11 +195,6 @@ impl Representation for Sh {
         Box::new(move |w| clamped_dot(&self.weights(table, w), &lobes.gamma))
     }
 
-    fn shader(&self) -> Shader {
-        let sources = &[include_str!("sh.wgsl"), include_str!("../sphere.wgsl"), include_str!("whole.wgsl")];
-        Shader { table: self.order + 1, ..Shader::new(sources).constant("ORDER", self.order as u32) }
-    }
-
     fn effective<'a>(&'a self, lobes: &Coefficients, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         let (rho, lobes) = (self.zonal(lobe), *lobes);
         Box::new(move |w| clamped_dot(&self.weights(&rho, w), &lobes.gamma))
@@ -170,9 +204,5 @@ impl Representation for Sh {
         let rho = self.zonal(lobe);
         let weights = directions.iter().flat_map(|w| self.weights(&rho, *w)).collect();
         Box::new(ShEvaluator { weights, count: sh_count(self.order) })
-    }
-
-    fn flat_lobe(&self, _brdf: &dyn Lobe) -> FlatLobe {
-        FlatLobe::BandLimited(self.order)
     }
 }

@@ -10,39 +10,53 @@
 //! has what that costs). Lambert is averaged over 5×5 slopes of the Gaussian, as in LEADR. On a surface that the map displaces, facets
 //! weigh by what the eye sees of them: `leadr.rs`.
 
+use std::fmt::{self, Display};
+
 use fearless_simd::{Level, dispatch};
 use glam::{DVec2, DVec3, Vec3};
 
 use super::leadr::SlopeGrid;
-use super::{Decoded, Representation, Row, Sample};
+use super::table::{count_of, counted};
+use super::{
+    AnyMethod, Decoded, Describe, Encoding, Form, FormKind, ParameterError, Representation, Row, Sample,
+};
 use crate::brdf::Lobe;
 use crate::shader::Shader;
-use crate::surface::{SurfaceRow, normal_of_slope, slope_of_normal};
+use crate::surface::{SurfaceRow, slope_of_normal};
 use crate::units::SlopeVariance;
 
 /// Moments of the slope.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Slopes {
     /// Slopes over which environments and diffuse facets of a displaced surface are averaged.
     grid: SlopeGrid,
 }
 
 impl Slopes {
-    /// Diffuse facets of displaced surfaces are averaged over `n` × `n` slopes, 5 to 128.
-    ///
-    /// # Panics
-    /// For another `n`.
+    /// The paper's 5 × 5 slopes.
     #[must_use]
-    pub fn new(n: usize) -> Self {
-        assert!((5..=128).contains(&n), "a grid has 5 to 128 slopes on a side");
-        Self { grid: SlopeGrid::new(n) }
+    pub fn new() -> Self {
+        Self { grid: SlopeGrid::new(5) }
+    }
+
+    /// Environments and diffuse facets of displaced surfaces averaged over `n` × `n` slopes, n from 5 to 128.
+    ///
+    /// # Errors
+    /// [`ParameterError::Count`] for another `n`.
+    pub fn with_grid(n: usize) -> Result<Self, ParameterError> {
+        counted(n, "number of slopes", 5..=128, "slopes:9").map(|n| Self { grid: SlopeGrid::new(n) })
+    }
+
+    /// The same number of slopes, drawn at random.
+    #[must_use]
+    pub fn drawn(self) -> Self {
+        Self { grid: SlopeGrid::drawn(self.grid.len()) }
     }
 }
 
 impl Default for Slopes {
-    /// The paper's 5 × 5.
     fn default() -> Self {
-        Self::new(5)
+        Self::new()
     }
 }
 
@@ -51,20 +65,19 @@ pub(super) const ROW: Row = Row {
     parameters: "[:N[:drawn]]",
     summary: "one anisotropic Gaussian of slopes, with the mean height; N × N of them (5) under environments and for displaced diffuse facets",
     paper: "Olano and Baker 2010 (LEAN); Dupuy et al. 2013 (LEADR)",
-    parse: |words| match words {
-        [] => Ok(Box::new(Slopes::default())),
-        [n] => match n.parse() {
-            Ok(n @ 5..=128) => Ok(Box::new(Slopes::new(n))),
-            _ => Err(format!("`{n}` is no number of slopes from 5 to 128")),
-        },
-        [n, "drawn"] => match n.parse() {
-            Ok(n @ 5..=128) => Ok(Box::new(Slopes { grid: SlopeGrid::drawn(n) })),
-            _ => Err(format!("`{n}` is no number of slopes from 5 to 128")),
-        },
-        _ => Err("takes one number at most, and perhaps `drawn`".to_owned()),
-    },
+    parse,
     samples: &["slopes", "slopes:9", "slopes:9:drawn"],
 };
+
+fn parse(words: &[&str]) -> Result<AnyMethod, ParameterError> {
+    let slopes = match words {
+        [] => Slopes::new(),
+        [n] => Slopes::with_grid(count_of(Some(n)))?,
+        [n, "drawn"] => Slopes::with_grid(count_of(Some(n)))?.drawn(),
+        _ => return Err(ParameterError::Words("takes one number at most, and perhaps `drawn`".to_owned())),
+    };
+    Ok(AnyMethod::from(slopes))
+}
 
 /// What is stored: means of height, slope and products of slopes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -170,21 +183,38 @@ fn moments_of_row(row: &SurfaceRow, first: &mut [[f32; 4]], second: &mut [[f32; 
     }
 }
 
+impl Display for Slopes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.grid.len(), self.grid.is_drawn()) {
+            (5, false) => f.write_str(ROW.name),
+            (n, false) => write!(f, "{}:{n}", ROW.name),
+            (n, true) => write!(f, "{}:{n}:drawn", ROW.name),
+        }
+    }
+}
+
+impl Describe for Slopes {
+    fn encoding(&self) -> Encoding {
+        Encoding::SlopeMoments
+    }
+
+    fn form_kind(&self) -> FormKind {
+        FormKind::Slopes
+    }
+
+    fn shader(&self) -> Shader {
+        Shader::new(FormKind::Slopes, &[include_str!("slopes.wgsl"), include_str!("stretched.wgsl")])
+            .constant("GRID", self.grid.len() as u32)
+            .constant("GRID_STEP", SlopeGrid::step(self.grid.len()) as f32)
+            .constant("GRID_WEIGHT", self.grid.middle_weight() as f32)
+            .constant("GRID_LEVEL", self.grid.level_offset() as f32)
+            .constant("GRID_DRAWN", self.grid.is_drawn())
+    }
+}
+
 impl Representation for Slopes {
     type Sums = SlopeMoments;
     type Lobes = SlopeGaussian;
-
-    fn spelling(&self) -> String {
-        match (self.grid.len(), self.grid.is_drawn()) {
-            (5, false) => ROW.name.to_owned(),
-            (n, false) => format!("{}:{n}", ROW.name),
-            (n, true) => format!("{}:{n}:drawn", ROW.name),
-        }
-    }
-
-    fn layers(&self) -> usize {
-        2
-    }
 
     fn zero(&self) -> SlopeMoments {
         SlopeMoments::default()
@@ -240,28 +270,8 @@ impl Representation for Slopes {
         SlopeGaussian { height: f64::from(sums.height), mean: DVec2::new(x, y), covariance }
     }
 
-    fn mean(&self, lobes: &SlopeGaussian) -> DVec3 {
-        normal_of_slope(lobes.mean.as_vec2()).as_dvec3()
-            / (1.0 + 0.5 * (lobes.covariance[0] + lobes.covariance[1]))
-    }
-
-    fn shader(&self) -> Shader {
-        Shader::new(&[
-            include_str!("slopes.wgsl"),
-            include_str!("stretched.wgsl"),
-            include_str!("whole.wgsl"),
-            include_str!("leadr.wgsl"),
-        ])
-        .constant("GRID", self.grid.len() as u32)
-        .constant("GRID_STEP", SlopeGrid::step(self.grid.len()) as f32)
-        .constant("GRID_WEIGHT", self.grid.middle_weight() as f32)
-        .constant("GRID_LEVEL", self.grid.level_offset() as f32)
-        .constant("GRID_DRAWN", self.grid.is_drawn())
-        .displaces()
-    }
-
-    fn displaced<'a>(&'a self, lobes: &'a SlopeGaussian) -> Option<(&'a SlopeGaussian, &'a SlopeGrid)> {
-        Some((lobes, &self.grid))
+    fn form<'a>(&'a self, lobes: &SlopeGaussian) -> Form<'a> {
+        Form::Slopes(*lobes, &self.grid)
     }
 
     fn effective<'a>(&'a self, lobes: &SlopeGaussian, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {

@@ -4,16 +4,21 @@
 //! `(1 + f_t s)/(1 + s)`. That is a convolution with a lobe of slope variance `(1-L)/L`, which is how the
 //! rule is carried to every other BRDF; for normalised Blinn-Phong it is the printed formula exactly.
 
+use std::fmt::{self, Display};
+
 use glam::{DVec3, Vec3};
 
-use super::mixture::{Cosine, NormalLobe, cosine};
-use super::{Decoded, Representation, Row, Sample, direction_or_up, no_parameters};
+use super::mixture::{NormalLobe, cosine};
+use super::{
+    Decoded, Describe, Encoding, Form, FormKind, Representation, Row, Sample, direction_or_up,
+    table::no_parameters,
+};
 use crate::brdf::Lobe;
 use crate::shader::Shader;
 use crate::units::SlopeVariance;
 
 /// One isotropic lobe from the length of the mean normal.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Toksvig;
 
 pub(super) const ROW: Row = Row {
@@ -44,17 +49,29 @@ impl From<MeanLobe> for Decoded {
 /// a lobe can be said to be.
 const MIN_LENGTH: f64 = 1e-3;
 
+impl Display for Toksvig {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(ROW.name)
+    }
+}
+
+impl Describe for Toksvig {
+    fn encoding(&self) -> Encoding {
+        Encoding::MeanNormal
+    }
+
+    fn form_kind(&self) -> FormKind {
+        FormKind::Lobes
+    }
+
+    fn shader(&self) -> Shader {
+        Shader::new(FormKind::Lobes, &[include_str!("toksvig.wgsl"), include_str!("sphere_cosine.wgsl")])
+    }
+}
+
 impl Representation for Toksvig {
     type Sums = Vec3;
     type Lobes = MeanLobe;
-
-    fn spelling(&self) -> String {
-        ROW.name.to_owned()
-    }
-
-    fn layers(&self) -> usize {
-        1
-    }
 
     fn zero(&self) -> Vec3 {
         Vec3::ZERO
@@ -82,25 +99,13 @@ impl Representation for Toksvig {
         MeanLobe { mean, variance: SlopeVariance::clamped((1.0 - length) / length) }
     }
 
-    fn mean(&self, lobes: &MeanLobe) -> DVec3 {
-        lobes.mean
+    fn form<'a>(&'a self, lobes: &MeanLobe) -> Form<'a> {
+        Form::Lobes(vec![NormalLobe::alone(direction_or_up(lobes.mean), lobes.variance)], cosine)
     }
 
     fn effective<'a>(&'a self, lobes: &MeanLobe, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         let (mu, widened) = (direction_or_up(lobes.mean), lobe.widen(lobes.variance));
         Box::new(move |w| widened.evaluate(w.dot(mu)))
-    }
-
-    fn shader(&self) -> Shader {
-        Shader::new(&[
-            include_str!("toksvig.wgsl"),
-            include_str!("sphere_cosine.wgsl"),
-            include_str!("mixture.wgsl"),
-        ])
-    }
-
-    fn isotropic(&self, lobes: &MeanLobe) -> Option<(Cosine, Vec<NormalLobe>)> {
-        Some((cosine, vec![NormalLobe::alone(direction_or_up(lobes.mean), lobes.variance)]))
     }
 }
 

@@ -8,19 +8,23 @@
 //! Stored about the pole, `alpha (1 - r.z)` in place of `alpha r.z`: as linear, and in half floats `1 - |r|²` keeps its
 //! digits (`docs/methods.md` has what that gains). `vmf:J:origin` stores the paper's form.
 
+use std::fmt::{self, Display};
+
 use glam::DVec3;
 
-use super::mixture::{
-    Cosine, LobeSums, MixtureEvaluator, NormalLobe, cosine, effective, mean_of, parse_mixture,
+use super::mixture::{LobeSums, MixtureEvaluator, NormalLobe, cosine, effective, parse_mixture};
+use super::table::counted;
+use super::{
+    AnyMethod, Decoded, Describe, Encoding, Evaluator, Form, FormKind, ParameterError, Representation, Row,
+    Sample, StoredSums, mixture::spell,
 };
-use super::{Decoded, Evaluator, Method, MixtureLobe, Representation, Row, Sample};
 use crate::brdf::Lobe;
-use crate::fit::{Fit, LobeKind, from_pole};
+use crate::fit::{Alignment, Fit, LobeKind, MAX_LOBES, from_pole};
 use crate::shader::Shader;
 use crate::units::SlopeVariance;
 
 /// Von Mises-Fisher lobes.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vmf {
     fit: Fit,
     /// Stored as the paper has it.
@@ -45,15 +49,38 @@ pub(super) const ROW: Row = Row {
     ],
 };
 
-fn parse(words: &[&str]) -> Result<Box<dyn Method>, String> {
-    let (fit, origin) = parse_mixture(words, LobeKind::Spherical, "origin", "vmf")?;
-    Ok(Box::new(Vmf { fit, origin }))
+fn parse(words: &[&str]) -> Result<AnyMethod, ParameterError> {
+    let fit = |lobes| Vmf::new(lobes).map(|vmf| vmf.fit);
+    parse_mixture(words, fit, "origin").map(|(fit, origin)| AnyMethod::from(Vmf { fit, origin }))
 }
 
 /// Shortest `|r|` that has a direction; below it a lobe is as wide as a lobe can be said to be.
 const MIN_LENGTH: f64 = 1e-3;
 
 impl Vmf {
+    /// This many lobes a texel, 1 to [`MAX_LOBES`], aligned by refinement.
+    ///
+    /// # Errors
+    /// [`ParameterError::Count`] for another number.
+    pub fn new(lobes: usize) -> Result<Self, ParameterError> {
+        let lobes = counted(lobes, "number of lobes", 1..=MAX_LOBES, "vmf:4")?;
+        let fit = Fit { kind: LobeKind::Spherical, lobes, alignment: Alignment::default() };
+        Ok(Self { fit, origin: false })
+    }
+
+    /// The same, lobes of neighbours made to correspond in another way.
+    #[must_use]
+    pub fn alignment(mut self, alignment: Alignment) -> Self {
+        self.fit.alignment = alignment;
+        self
+    }
+
+    /// The same, stored about the origin, as the paper has it.
+    #[must_use]
+    pub fn about_origin(self) -> Self {
+        Self { origin: true, ..self }
+    }
+
     /// From `alpha (1 - r.z)` to `alpha r.z`, where asked; and back, since both are `alpha` less the other.
     fn turned(&self, &[alpha, x, y, w]: &[f32; 4]) -> [f32; 4] {
         [alpha, x, y, if self.origin { alpha - w } else { w }]
@@ -62,7 +89,7 @@ impl Vmf {
     /// The lobes that the sums decode to, dead ones left out.
     fn lobes(sums: &LobeSums) -> Vec<NormalLobe> {
         let total = sums.total();
-        let lobe = |(layer, &[alpha, x, y, w]): (usize, &[f32; 4])| {
+        let lobe = |(index, &[alpha, x, y, w]): (usize, &[f32; 4])| {
             let alpha = f64::from(alpha);
             let (x, y, w) = (f64::from(x) / alpha, f64::from(y) / alpha, f64::from(w) / alpha);
             // 1 - |r|² of r = (x, y, 1 - w).
@@ -70,7 +97,7 @@ impl Vmf {
             let length = (1.0 - short).sqrt().max(MIN_LENGTH);
             let mean = DVec3::new(x, y, 1.0 - w).try_normalize().unwrap_or(DVec3::Z);
             let variance = SlopeVariance::clamped(short / (length * (3.0 - length * length)));
-            NormalLobe { layer, weight: alpha / total, mean, variance }
+            NormalLobe { index, weight: alpha / total, mean, variance }
         };
         sums.alive().map(lobe).collect()
     }
@@ -85,31 +112,39 @@ pub struct VmfMixture {
 
 impl From<VmfMixture> for Decoded {
     fn from(mixture: VmfMixture) -> Self {
-        let lobe = |l: &NormalLobe| MixtureLobe {
-            layer: l.layer,
-            weight: l.weight,
-            mean: l.mean,
-            variance: l.variance.get(),
-        };
-        Self::Lobes(mixture.lobes.iter().map(lobe).collect())
+        Self::Lobes(mixture.lobes)
+    }
+}
+
+impl Display for Vmf {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&spell(ROW.name, &self.fit, self.origin.then_some("origin")))
+    }
+}
+
+impl Describe for Vmf {
+    fn encoding(&self) -> Encoding {
+        let sums = if self.origin { StoredSums::Plain } else { StoredSums::AboutPole };
+        Encoding::Lobes { kind: self.fit.kind, count: self.fit.lobes, sums }
+    }
+
+    fn form_kind(&self) -> FormKind {
+        FormKind::Lobes
+    }
+
+    fn shader(&self) -> Shader {
+        Shader::new(FormKind::Lobes, &[include_str!("vmf.wgsl"), include_str!("sphere_cosine.wgsl")])
+            .constant("ORIGIN", self.origin)
+    }
+
+    fn fit(&self) -> Option<Fit> {
+        Some(self.fit)
     }
 }
 
 impl Representation for Vmf {
     type Sums = LobeSums;
     type Lobes = VmfMixture;
-
-    fn spelling(&self) -> String {
-        super::mixture::spell(ROW.name, &self.fit, self.origin.then_some("origin"))
-    }
-
-    fn layers(&self) -> usize {
-        self.fit.lobes
-    }
-
-    fn encoding(&self) -> &'static str {
-        if self.origin { "sums" } else { "sums-about-pole" }
-    }
 
     fn zero(&self) -> LobeSums {
         LobeSums::zero(self.fit.lobes)
@@ -144,33 +179,16 @@ impl Representation for Vmf {
         VmfMixture { lobes: Self::lobes(sums) }
     }
 
-    fn mean(&self, lobes: &VmfMixture) -> DVec3 {
-        mean_of(&lobes.lobes)
+    fn form<'a>(&'a self, lobes: &VmfMixture) -> Form<'a> {
+        Form::Lobes(lobes.lobes.clone(), cosine)
     }
 
     fn effective<'a>(&'a self, lobes: &VmfMixture, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
         effective(&lobes.lobes, lobe, cosine)
     }
 
-    fn shader(&self) -> Shader {
-        Shader::new(&[
-            include_str!("vmf.wgsl"),
-            include_str!("sphere_cosine.wgsl"),
-            include_str!("mixture.wgsl"),
-        ])
-        .constant("ORIGIN", self.origin)
-    }
-
-    fn isotropic(&self, lobes: &VmfMixture) -> Option<(Cosine, Vec<NormalLobe>)> {
-        Some((cosine, lobes.lobes.clone()))
-    }
-
     fn evaluator<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
         let lobes = |channels: &[f32]| Self::lobes(&self.unpack(channels));
         Box::new(MixtureEvaluator { lobes, cosine, lobe, directions })
-    }
-
-    fn fit(&self) -> Option<Fit> {
-        Some(self.fit)
     }
 }

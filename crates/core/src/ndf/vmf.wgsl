@@ -8,7 +8,8 @@ const DEAD: f32 = 1e-5;
 // Shortest |r| that has a direction.
 const MIN_LENGTH: f32 = 1e-3;
 
-fn decode_lobe(sums: vec4<f32>) -> NormalLobe {
+fn decode_lobe(channels: ptr<function, Channels>, layer: u32) -> NormalLobe {
+    let sums = (*channels)[layer];
     let alpha = sums.x;
     if !(alpha > DEAD) {
         return NormalLobe(vec3<f32>(0.0, 0.0, 1.0), 0.0, 0.0);

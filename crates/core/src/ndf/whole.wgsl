@@ -1,4 +1,4 @@
-// Shading methods whose texels are one distribution. Twin of `reflect` in reflect.rs, for those without `isotropic`.
+// Shading methods whose texels are one distribution. Twin of `reflect` in reflect.rs, for the forms `Whole` and `Slopes`.
 //
 // A method brings `Decoded`, `decode`, `mean_normal`, `effective` (around the half-vector) and `effective_diffuse`.
 

@@ -3,9 +3,9 @@
 use glam::DVec3;
 
 use crate::bake::Bake;
-use crate::fit::{LobeKind, Rgba};
+use crate::fit::Rgba;
 use crate::grid::{Grid, Size};
-use crate::ndf::{Decoded, Method};
+use crate::ndf::{AnyMethod, Decoded, Method};
 use crate::pyramid::{Precision, Pyramid};
 use crate::surface::{Surface, SurfaceRow, Wraps};
 
@@ -33,10 +33,10 @@ impl BakedMaterial {
     ) -> Self {
         let bake = Bake { surface: &*material.surface, method, precision, progress };
         let maps = material.textures.as_ref().map_or_else(Vec::new, |map| map.grids());
-        if let Some(pyramid) = material.surface.baked(&method.spelling()) {
+        if let Some(pyramid) = material.surface.baked(method) {
             return Self { pyramid: pyramid.clone(), attributes: 0, params: maps };
         }
-        if method.fit().is_some_and(|fit| fit.kind != LobeKind::Peaks) {
+        if method.carries_attributes() {
             let (pyramid, _) = bake.to_pyramid_with(&maps);
             return Self { pyramid, attributes: maps.len(), params: Vec::new() };
         }
@@ -48,7 +48,7 @@ impl BakedMaterial {
 /// normal, is what the truth sees and what other methods bake.
 pub struct BakedSurface {
     /// What it is baked with.
-    pub method: Box<dyn Method>,
+    pub method: AnyMethod,
     /// The map.
     pub pyramid: Pyramid,
 }
@@ -88,7 +88,11 @@ impl Surface for BakedSurface {
         })
     }
 
-    fn baked(&self, method: &str) -> Option<&Pyramid> {
-        (self.method.spelling() == method).then_some(&self.pyramid)
+    /// For methods that read the same channels, and would have fitted the same lobes.
+    fn baked(&self, method: &dyn Method) -> Option<&Pyramid> {
+        let same = method.reads(&self.method.encoding())
+            && method.layers() == self.method.layers()
+            && method.fit() == self.method.fit();
+        same.then_some(&self.pyramid)
     }
 }

@@ -30,7 +30,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use crate::brdf::{self, Argument, Brdf, Lobe, ShadingModel, SurfaceParams};
+use crate::brdf::{self, AnyLobe, Argument, Brdf, Lobe, ShadingModel, SurfaceParams};
 use crate::grid::Size;
 use crate::light::Light;
 use crate::light::environment::SceneEnvironment;
@@ -180,7 +180,7 @@ impl Scene {
             material.displacement = Some(displacement);
             material.brdf.shading = if shadows { ShadingModel::Shadowed } else { ShadingModel::Masked };
             if let Some(lobe) = material.brdf.lobe.as_beckmann() {
-                material.brdf.lobe = Box::new(lobe);
+                material.brdf.lobe = lobe.into();
             }
         }
         if any { Ok(()) } else { Err(NoHeights) }
@@ -238,8 +238,8 @@ fn sun(towards: [f64; 3], irradiance: [f64; 3]) -> Light {
 
 /// A lobe in a model, for the scenes' own spellings.
 fn brdf(shading: ShadingModel, lobe: &str) -> Brdf {
-    let lobe: Box<dyn Lobe> = brdf::parse(lobe).unwrap_or_else(|e| unreachable!("{e}"));
-    Brdf { lobe, shading }
+    let lobe: AnyLobe = lobe.parse().unwrap_or_else(|e| unreachable!("{e}"));
+    Brdf::new(lobe, shading)
 }
 
 /// From `a` to `b` by equal factors, as time goes from 0 to 1.

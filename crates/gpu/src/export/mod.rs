@@ -103,18 +103,18 @@ impl Export<'_> {
         let lobe = &*self.brdf.lobe;
         let (least, most) = (SlopeVariance::ZERO, SlopeVariance::ZERO);
         let table = self.method.shader_table(self.brdf, least, most);
-        let entry = |(i, entry): (usize, &[f32; 12])| {
-            let (first, last, lobe, diffuse) = (3 * i, 3 * i + 2, entry[0], entry[11]);
+        let entry = |(i, (lobe, diffuse)): (usize, (&[f32], f32))| {
+            let (first, last, lobe) = (3 * i, 3 * i + 2, lobe[0]);
             format!("    brdf.table[{first}].x = {lobe:?};\n    brdf.table[{last}].w = {diffuse:?};\n")
         };
         let brdf = format!(
             "// The lobe {}, in the model `{}`.\nfn ndf_brdf() -> Brdf {{\n    var brdf: Brdf;\n    \
              brdf.base = {:?};\n    brdf.shading = {}u;\n{}    return brdf;\n}}\n",
-            lobe.spelling(),
-            self.brdf.shading.name(),
+            lobe,
+            self.brdf.shading,
             lobe.base() as f32,
             self.brdf.shading.index(),
-            table.iter().enumerate().map(entry).collect::<String>()
+            table.lobe().zip(table.diffuse()).enumerate().map(entry).collect::<String>()
         );
         let method = shader::link(self.method, lobe, 0);
         let library = include_str!("library.wgsl");
@@ -134,8 +134,8 @@ impl Export<'_> {
         } else {
             "any sampler: this method reads texels one by one, of a map that repeats"
         };
-        let (layers, method) = (self.method.layers(), self.method.spelling());
-        let (lobe, shading) = (self.brdf.lobe.spelling(), self.brdf.shading.name());
+        let (layers, method) = (self.method.layers(), self.method.to_string());
+        let (lobe, shading) = (self.brdf.lobe.to_string(), self.brdf.shading.name());
         format!(
             "Normal distribution map, method {method}, lobe {lobe}, model {shading}. Made by ndfmap {}.\n\
              \n\

@@ -23,7 +23,7 @@ fn shade(place: Place, channels: ptr<function, Channels>, plain: SurfaceParams) 
     var decoded = decode(channels);
     var sum = vec3<f32>(0.0);
     // A facet of relief may face what its base turns its back on.
-    let displaced = DISPLACES && place.displaced;
+    let displaced = KNOWS_DISPLACEMENT && place.displaced;
     if place.wo.z <= 0.0 && !displaced {
         return sum;
     }
@@ -77,7 +77,7 @@ fn filtered(in: Varying) -> @location(0) vec4<f32> {
     if masked_out(in.pixel) {
         return vec4<f32>(0.0);
     }
-    let place = place_of(in, DISPLACES);
+    let place = place_of(in, KNOWS_DISPLACEMENT);
     let around = taps_of(place);
     var channels = Channels();
     let count = around.columns * around.rows;
@@ -99,7 +99,7 @@ fn sampled(in: Varying) -> @location(0) vec4<f32> {
     if masked_out(in.pixel) {
         return vec4<f32>(0.0);
     }
-    let place = place_of(in, DISPLACES);
+    let place = place_of(in, KNOWS_DISPLACEMENT);
     var channels = Channels();
     for (var layer = 0u; layer < ALL_LAYERS; layer++) {
         channels[layer] = textureSampleGrad(map, linear, place.uv, layer, place.duv_dx, place.duv_dy);
@@ -117,7 +117,7 @@ fn neighbours(in: Varying) -> @location(0) vec4<f32> {
     if masked_out(in.pixel) {
         return vec4<f32>(0.0);
     }
-    let place = place_of(in, DISPLACES);
+    let place = place_of(in, KNOWS_DISPLACEMENT);
     let around = taps_of(place);
     let plain = filtered_params(around);
     let repeat = vec2<bool>((material.repeat & 1u) != 0u, (material.repeat & 2u) != 0u);

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
 use glam::{DVec3, Vec2, Vec3, Vec4};
-use ndfmap_core::brdf::{Brdf, Ggx, Lobe, ShadingModel, SurfaceParams};
+use ndfmap_core::brdf::{Brdf, Ggx, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
 use ndfmap_core::scene::{Camera, Material, Mesh, Object, Scene, SceneOptions, Vertex, area_normals};
@@ -187,8 +187,7 @@ fn plain() -> Material {
 /// GGX in Smith's model; `alpha` is held to what the lobe takes.
 fn microfacets(alpha: f64) -> Brdf {
     let alpha = Alpha::new(alpha.clamp(1e-4, 1.0)).unwrap_or_else(|e| unreachable!("{e}"));
-    let lobe: Box<dyn Lobe> = Box::new(Ggx::new(alpha));
-    Brdf { lobe, shading: ShadingModel::Smith }
+    Brdf::new(Ggx::new(alpha), ShadingModel::Smith)
 }
 
 impl RawMesh {

@@ -6,8 +6,9 @@ use std::io::Cursor;
 
 use ndfmap_core::bake::Bake;
 use ndfmap_core::grid::Size;
+use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::procedural;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::{ndf, procedural};
 use ndfmap_maps::source::{SourceOptions, read_source};
 use ndfmap_maps::{Header, NdfMap, VERSION};
 
@@ -94,15 +95,15 @@ pub(crate) fn baked(method: &str, builtin: &str, precision: Precision) -> NdfMap
     let options = SourceOptions { builtin_size: Size { width: 21, height: 13 }, ..Default::default() };
     let map = read_source(format!("builtin:{builtin}").as_ref(), &options).unwrap();
     assert!(procedural::find(builtin).is_some());
-    let method = ndf::parse(method).unwrap();
+    let method = method.parse::<AnyMethod>().unwrap();
     let bake = Bake { surface: &*map.surface, method: &*method, precision, progress: &|_| () };
     let header = Header {
         version: VERSION,
-        method: method.spelling(),
+        method: method.to_string(),
         width: 21,
         height: 13,
         wrap: Header::spell_wraps(map.surface.wraps()),
-        encoding: method.encoding().to_owned(),
+        encoding: method.encoding().name().to_owned(),
         attributes: Vec::new(),
         source: map.source,
     };

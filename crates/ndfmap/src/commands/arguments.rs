@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use ndfmap_core::brdf::{self, Lobe, LobeFactors, ParseLobeError, ShadingModel};
+use ndfmap_core::brdf::{self, AnyLobe, LobeFactors, ParseLobeError, ShadingModel};
 use ndfmap_core::grid::Size;
 use ndfmap_core::light::environment::{SceneEnvironment, Technique, builtin};
-use ndfmap_core::ndf::{self, Method, ParseMethodError};
+use ndfmap_core::ndf::{self, AnyMethod, ParseMethodError};
 use ndfmap_core::surface::{SlopeFilter, Wrap, Wraps};
 use ndfmap_core::{pyramid, scene};
 use ndfmap_maps::SourceKind;
@@ -228,7 +228,7 @@ pub(super) fn size(text: &str) -> Result<Size, String> {
 
 /// Checks a method's spelling; an unknown one suggests the nearest.
 pub(super) fn method_spelling(text: &str) -> Result<String, String> {
-    match ndf::parse(text) {
+    match text.parse::<AnyMethod>() {
         Ok(_) => Ok(text.to_owned()),
         Err(ParseMethodError::Unknown(name)) => Err(unknown(&name, ndf::TABLE.iter().map(|r| r.name))),
         Err(other) => Err(other.to_string()),
@@ -246,7 +246,7 @@ pub(super) fn brdf_spelling(text: &str) -> Result<String, String> {
     if text.starts_with(MERL) {
         return Ok(text.to_owned());
     }
-    match brdf::parse(text) {
+    match text.parse::<AnyLobe>() {
         Ok(_) => Ok(text.to_owned()),
         Err(ParseLobeError::Unknown(name)) => {
             Err(unknown(&name, brdf::TABLE.iter().map(|r| r.name).chain(["merl"])))
@@ -256,8 +256,8 @@ pub(super) fn brdf_spelling(text: &str) -> Result<String, String> {
 }
 
 /// The lobe of a checked spelling. Of one that was measured it is said what its factors leave.
-pub(super) fn read_brdf(spelling: &str) -> Result<Box<dyn Lobe>, crate::Failure> {
-    let lobe: Box<dyn Lobe> = match spelling.strip_prefix(MERL) {
+pub(super) fn read_brdf(spelling: &str) -> Result<AnyLobe, crate::Failure> {
+    let lobe: AnyLobe = match spelling.strip_prefix(MERL) {
         Some(file) => {
             let (lobe, missing) = read_merl(file.as_ref())?;
             if missing > 0 {
@@ -266,9 +266,9 @@ pub(super) fn read_brdf(spelling: &str) -> Result<Box<dyn Lobe>, crate::Failure>
                     &format!("{missing} values are negative or no number, and left out"),
                 );
             }
-            Box::new(lobe)
+            lobe.into()
         }
-        None => brdf::parse(spelling).map_err(|e| crate::Failure::Usage(e.to_string()))?,
+        None => spelling.parse::<AnyLobe>().map_err(|e| crate::Failure::Usage(e.to_string()))?,
     };
     if let Some(LobeFactors { residual, kernels, .. }) = lobe.measured() {
         let [factored, fitted] = [residual.factored, residual.fitted].map(|left| 100.0 * left);
@@ -326,8 +326,8 @@ pub(super) fn brdfs_help() -> String {
 }
 
 /// The method of a checked spelling.
-pub(super) fn method(spelling: &str) -> Result<Box<dyn Method>, crate::Failure> {
-    ndf::parse(spelling).map_err(|e| crate::Failure::Usage(e.to_string()))
+pub(super) fn method(spelling: &str) -> Result<AnyMethod, crate::Failure> {
+    spelling.parse::<AnyMethod>().map_err(|e| crate::Failure::Usage(e.to_string()))
 }
 
 /// Reads the name of a shading model.

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use ndfmap_core::bake::{Bake as CoreBake, BakeReport, MemorySink};
-use ndfmap_core::ndf::Method;
+use ndfmap_core::ndf::{AnyMethod, Method};
 use ndfmap_core::pyramid;
 use ndfmap_maps::attribute::{AttributeMap, Transfer, read_attribute};
 use ndfmap_maps::formats::exr::{write_bumpslopes, write_native};
@@ -143,7 +143,7 @@ impl Bake {
     }
 
     /// The method asked for, or chosen by measuring.
-    fn choose(&self, map: &SourceMap) -> Result<(Box<dyn Method>, Option<Choice>), Failure> {
+    fn choose(&self, map: &SourceMap) -> Result<(AnyMethod, Option<Choice>), Failure> {
         if self.method != AUTO {
             return Ok((method(&self.method)?, None));
         }
@@ -180,16 +180,16 @@ impl Bake {
         if !attributes.is_empty() && !carries_attributes(&*method) {
             return Err(Failure::Usage(format!(
                 "`{}` has no lobes that carry attributes; `vmf` and `gmm` have",
-                method.spelling()
+                method
             )));
         }
         say_if_replaced(&self.output);
         let done = self.bake(target, &map, &*method, &attributes)?;
         let levels = ndfmap_core::pyramid::level_sizes(size).len();
-        let layers = method.layers() * (1 + attributes.len());
+        let layers = method.layers_with(attributes.len());
         if json {
             let mut value = json!({
-                "method": method.spelling(),
+                "method": method.to_string(),
                 "width": size.width,
                 "height": size.height,
                 "levels": levels,
@@ -210,7 +210,7 @@ impl Bake {
             self.output.display(),
             size.width,
             size.height,
-            method.spelling(),
+            method,
             done.bytes,
             read,
             done.bake,
@@ -225,7 +225,7 @@ impl Bake {
         method: &dyn Method,
         attributes: &[AttributeMap],
     ) -> Result<Done, Failure> {
-        let progress = Progress::new(&method.spelling());
+        let progress = Progress::new(&method.to_string());
         // Bumpslopes of heights change their units, so they are rounded when written, and only then.
         let converts = target == Target::Bumpslopes && map.surface.has_height();
         let precision = if converts { pyramid::Precision::Single } else { self.precision.into() };
@@ -282,11 +282,11 @@ pub(super) fn header_of(map: &SourceMap, method: &dyn Method) -> Header {
     let size = map.surface.size();
     Header {
         version: VERSION,
-        method: method.spelling(),
+        method: method.to_string(),
         width: size.width,
         height: size.height,
         wrap: Header::spell_wraps(map.surface.wraps()),
-        encoding: method.encoding().to_owned(),
+        encoding: method.encoding().name().to_owned(),
         attributes: Vec::new(),
         source: map.source.clone(),
     }

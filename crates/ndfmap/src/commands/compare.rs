@@ -4,9 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
-use ndfmap_core::brdf::Lobe;
+use ndfmap_core::brdf::{AnyLobe, Lobe};
 use ndfmap_core::grid::Size;
-use ndfmap_core::ndf::Method;
 use ndfmap_core::pyramid;
 use ndfmap_maps::source::{SourceMap, read_source};
 use ndfmap_trace::filtered::Lookups;
@@ -24,6 +23,7 @@ use crate::imaging::{RenderJob, RenderReport, shoot};
 use crate::measure::{self, Comparison, Subject};
 use crate::report::{self, Pages};
 use crate::staging::SceneSpec;
+use ndfmap_core::ndf::AnyMethod;
 
 /// What every comparison carries unless told otherwise: the baselines, each linear method, and mixtures.
 pub(super) const DEFAULT_METHODS: &str =
@@ -77,11 +77,11 @@ pub(super) struct Compare {
 
 impl Compare {
     pub(super) fn run(self, json: bool) -> Result<(), Failure> {
-        let mut methods: Vec<Box<dyn Method>> = Vec::new();
+        let mut methods: Vec<AnyMethod> = Vec::new();
         for spelling in &self.methods {
             let method = method(spelling)?;
             // Two spellings of one method would share a key in the JSON.
-            if methods.iter().all(|m| m.spelling() != method.spelling()) {
+            if !methods.contains(&method) {
                 methods.push(method);
             }
         }
@@ -93,7 +93,7 @@ impl Compare {
             warn(&self.map, warning);
         }
         let environment = self.environment.read()?;
-        let brdf: Arc<dyn Lobe> = read_brdf(&self.brdf)?.into();
+        let brdf: AnyLobe = read_brdf(&self.brdf)?;
         let run = Run {
             map: &map,
             methods: &methods,
@@ -104,7 +104,7 @@ impl Compare {
                 stage: SceneSpec {
                     scene: scene.clone(),
                     map: Some(Arc::clone(&map.surface)),
-                    lobe: Some(Arc::clone(&brdf)),
+                    lobe: Some(brdf.clone()),
                     displacement: self.displace.displacement(),
                     environment: environment.clone(),
                     ..SceneSpec::default()
@@ -142,7 +142,7 @@ impl Compare {
 /// A comparison of a source, perhaps with pictures and a report.
 pub(super) struct Run<'a> {
     pub(super) map: &'a SourceMap,
-    pub(super) methods: &'a [Box<dyn Method>],
+    pub(super) methods: &'a [AnyMethod],
     pub(super) brdf: &'a dyn Lobe,
     pub(super) precision: pyramid::Precision,
     pub(super) filtering: bool,

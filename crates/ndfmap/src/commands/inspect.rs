@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use ndfmap_core::ndf::{Decoded, MixtureLobe, PlanarLobe};
+use ndfmap_core::ndf::{Decoded, LobeLayout, NormalLobe};
 use ndfmap_core::surface::{SurfaceRow, integrability, slope_of_normal};
 use ndfmap_maps::formats::{read_file, read_ndf};
 use ndfmap_maps::source::{BUILTIN_PREFIX, read_source};
@@ -61,8 +61,9 @@ impl Inspect {
         let mut value = json!({ "level": level, "x": x, "y": y, "method": map.header.method });
         let channels = map.pyramid.texel(level, x, y);
         let mut decoded = describe(method.describe(&channels[..4 * method.layers()]));
-        if let Some(lobes) = decoded.get_mut("lobes").and_then(Value::as_array_mut) {
-            lobes.iter_mut().for_each(|lobe| add_attributes(lobe, map, &channels, method.layers()));
+        let lobes = decoded.get_mut("lobes").and_then(Value::as_array_mut);
+        if let (Some(lobes), Some(layout)) = (lobes, method.lobe_layout()) {
+            lobes.iter_mut().for_each(|lobe| add_attributes(lobe, map, &channels, layout));
         }
         let (Value::Object(all), Value::Object(decoded)) = (&mut value, decoded) else {
             unreachable!("both are written as objects");
@@ -109,14 +110,12 @@ impl Inspect {
 }
 
 /// Adds to a lobe what it carries: the mean of each attribute over its normals, by the attribute's name.
-fn add_attributes(lobe: &mut Value, map: &NdfMap, channels: &[f32], layers: usize) {
-    let layer = lobe["layer"].as_u64().unwrap_or(0) as usize;
-    let weight = channels[4 * layer];
+fn add_attributes(lobe: &mut Value, map: &NdfMap, channels: &[f32], layout: LobeLayout) {
+    let index = lobe["layer"].as_u64().unwrap_or(0) as usize;
     let mut carried = Map::new();
     for (k, attribute) in map.header.attributes.iter().enumerate() {
-        let stored = &channels[4 * ((k + 1) * layers + layer)..][..attribute.channels.min(4)];
-        let mean: Vec<f32> = stored.iter().map(|y| y / weight).collect();
-        carried.insert(attribute.name.clone(), json!(mean));
+        let Some(mean) = layout.attribute(channels, k, index) else { continue };
+        carried.insert(attribute.name.clone(), json!(mean[..attribute.channels.min(4)]));
     }
     if !carried.is_empty() {
         lobe["attributes"] = carried.into();
@@ -146,21 +145,24 @@ fn describe(decoded: Decoded) -> Value {
         }
         Decoded::Coefficients(gamma) => json!({ "coefficients": gamma }),
         Decoded::Lobes(lobes) => {
-            let lobe = |l: &MixtureLobe| {
-                let kappa = l.variance.recip().min(MOST_KAPPA);
-                json!({ "layer": l.layer, "weight": l.weight, "mean": l.mean.to_array(), "kappa": kappa })
+            let lobe = |l: &NormalLobe| {
+                let kappa = l.variance.get().recip().min(MOST_KAPPA);
+                json!({ "layer": l.index, "weight": l.weight, "mean": l.mean.to_array(), "kappa": kappa })
             };
             json!({ "lobes": lobes.iter().map(lobe).collect::<Vec<_>>() })
         }
         Decoded::Peaks(peaks) => {
-            let peak = |p: &MixtureLobe| {
-                let exponent = p.variance.recip().min(MOST_KAPPA);
-                json!({ "layer": p.layer, "weight": p.weight, "mean": p.mean.to_array(), "exponent": exponent })
+            let peak = |p: &NormalLobe| {
+                let exponent = p.variance.get().recip().min(MOST_KAPPA);
+                json!({ "layer": p.index, "weight": p.weight, "mean": p.mean.to_array(), "exponent": exponent })
             };
             json!({ "peaks": peaks.iter().map(peak).collect::<Vec<_>>() })
         }
         Decoded::PlanarLobes(lobes) => {
-            let lobe = |l: &PlanarLobe| json!({ "layer": l.layer, "weight": l.weight, "mean": l.mean.to_array(), "variance": l.variance });
+            let lobe = |l: &NormalLobe| {
+                let (mean, variance) = (l.mean.truncate().to_array(), l.variance.get());
+                json!({ "layer": l.index, "weight": l.weight, "mean": mean, "variance": variance })
+            };
             json!({ "lobes": lobes.iter().map(lobe).collect::<Vec<_>>() })
         }
     }

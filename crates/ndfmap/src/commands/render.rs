@@ -10,7 +10,6 @@ use ndfmap_core::brdf::ShadingModel;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
 use ndfmap_core::lookup::Filtering;
-use ndfmap_core::ndf::Method;
 use ndfmap_core::scene::{self, BakedSurface};
 use ndfmap_core::surface::Surface;
 use ndfmap_core::tone::Tone;
@@ -33,6 +32,7 @@ use crate::engine::Gpu;
 use crate::imaging::{Frame, RenderJob, RenderReport, shoot};
 use crate::report::pictures::{self, Plan};
 use crate::staging::{CameraArgument, DisplacementOptions, SceneSpec};
+use ndfmap_core::ndf::AnyMethod;
 
 /// Render a scene through baked maps, and by brute force to compare
 #[derive(Debug, Args)]
@@ -216,7 +216,7 @@ fn scenes_help() -> String {
 
 fn tone(text: &str) -> Result<Tone, String> {
     let names = Tone::ALL.map(Tone::name).join(", ");
-    Tone::ALL.into_iter().find(|t| t.name() == text).ok_or_else(|| format!("`{text}` is none of {names}"))
+    Tone::ALL.iter().copied().find(|t| t.name() == text).ok_or_else(|| format!("`{text}` is none of {names}"))
 }
 
 fn time(text: &str) -> Result<f64, String> {
@@ -331,12 +331,12 @@ impl Render {
         }
         let baked = self.read_baked()?;
         let usual = if self.displace.displace.is_some() { "slopes" } else { "vmf:4" };
-        let own = baked.as_ref().map_or_else(|| usual.to_owned(), |map| map.method.spelling());
+        let own = baked.as_ref().map_or_else(|| usual.to_owned(), |map| map.method.to_string());
         let asked = if self.method.is_empty() { std::slice::from_ref(&own) } else { &self.method[..] };
-        let mut methods: Vec<Box<dyn Method>> = Vec::new();
+        let mut methods: Vec<AnyMethod> = Vec::new();
         for spelling in asked {
             let method = method(spelling)?;
-            if methods.iter().all(|m| m.spelling() != method.spelling()) {
+            if methods.iter().all(|m| m.to_string() != method.to_string()) {
                 methods.push(method);
             }
         }
@@ -347,7 +347,7 @@ impl Render {
             && let Some(method) = methods.iter().find(|m| !m.filterable())
         {
             let why = "cannot be filtered, and has no use for `--sampler`";
-            return Err(Failure::Usage(format!("{} {why}", method.spelling())));
+            return Err(Failure::Usage(format!("{} {why}", method)));
         }
         let stage = self.stage(baked)?;
         let times = match self.frames {
@@ -453,7 +453,7 @@ impl Render {
             scene: self.scene.clone(),
             map,
             map_size: self.map_size,
-            lobe: self.brdf.as_deref().map(read_brdf).transpose()?.map(Arc::from),
+            lobe: self.brdf.as_deref().map(read_brdf).transpose()?,
             shading: self.model,
             camera: self.camera,
             lights: self.light.clone(),

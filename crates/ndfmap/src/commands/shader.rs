@@ -65,8 +65,8 @@ impl Shader {
                 Failure::Usage(format!("{} is no text: name a file with `-o`", language.name))
             })?;
             return print_json(&json!({
-                "method": method.spelling(),
-                "brdf": brdf.lobe.spelling(),
+                "method": method.to_string(),
+                "brdf": brdf.lobe.to_string(),
                 "model": self.model.name(),
                 "language": language.name,
                 "layers": method.layers(),

@@ -3,11 +3,11 @@
 
 use glam::DVec2;
 use ndfmap_core::bake::Bake;
-use ndfmap_core::brdf;
+use ndfmap_core::brdf::AnyLobe;
 use ndfmap_core::fit::{Alignment, LobeKind};
 use ndfmap_core::lookup::{Tap, Texels};
 use ndfmap_core::measure::{TexelTruth, evaluate_neighbours};
-use ndfmap_core::ndf::{self, Method};
+use ndfmap_core::ndf::{AnyMethod, Gmm, Method, Vmf};
 use ndfmap_core::pyramid::Pyramid;
 use ndfmap_core::sphere::DiskLattice;
 
@@ -29,7 +29,7 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Option<Can
         return None;
     }
     let size = comparison.sizes[level];
-    let pen = brdf::parse(PEN).unwrap_or_else(|e| unreachable!("the pen is a constant: {e}"));
+    let pen = PEN.parse::<AnyLobe>().unwrap_or_else(|e| unreachable!("the pen is a constant: {e}"));
     let lattice = DiskLattice::new(SIDE, 0.99);
     let truth = TexelTruth::new(subject.surface, &*pen, &lattice);
     let (x, y) = busiest(subject, size);
@@ -79,18 +79,17 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Option<Can
 /// A mixture's row, its method, and the same method unaligned.
 struct Mixture<'a> {
     row: &'a Row,
-    method: Box<dyn Method>,
-    unaligned: Box<dyn Method>,
+    method: AnyMethod,
+    unaligned: AnyMethod,
 }
 
 fn mixture(row: &Row) -> Option<Mixture<'_>> {
-    let method = ndf::parse(&row.method).ok()?;
+    let method = row.method.parse::<AnyMethod>().ok()?;
     let fit = method.fit().filter(|f| f.lobes > 1 && f.alignment != Alignment::Unaligned)?;
-    let name = match fit.kind {
-        LobeKind::Spherical => "vmf",
-        LobeKind::Planar => "gmm",
+    let unaligned = match fit.kind {
+        LobeKind::Spherical => Vmf::new(fit.lobes).ok()?.alignment(Alignment::Unaligned).into(),
+        LobeKind::Planar => Gmm::new(fit.lobes).ok()?.alignment(Alignment::Unaligned).into(),
         LobeKind::Peaks => return None,
     };
-    let unaligned = ndf::parse(&format!("{name}:{}:{}", fit.lobes, Alignment::Unaligned.name())).ok()?;
     Some(Mixture { row, method, unaligned })
 }

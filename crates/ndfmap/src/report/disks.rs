@@ -4,10 +4,11 @@ use glam::Vec3;
 use ndfmap_core::grid::Size;
 use ndfmap_core::measure::TexelTruth;
 use ndfmap_core::sphere::DiskLattice;
-use ndfmap_core::{brdf, ndf};
 
 use super::canvas::{Canvas, LETTER, LINE, heat};
 use crate::measure::{Comparison, Subject};
+use ndfmap_core::brdf::AnyLobe;
+use ndfmap_core::ndf::AnyMethod;
 
 /// Points of the lattice a side, and pixels a point.
 pub(super) const SIDE: usize = 72;
@@ -21,7 +22,7 @@ const LEVELS: [usize; 3] = [3, 5, 7];
 
 /// Draws the disks: a row a level, a column a method.
 pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Canvas {
-    let pen = brdf::parse(PEN).unwrap_or_else(|e| unreachable!("the pen is a constant: {e}"));
+    let pen = PEN.parse::<AnyLobe>().unwrap_or_else(|e| unreachable!("the pen is a constant: {e}"));
     let lattice = DiskLattice::new(SIDE, 0.99);
     let truth = TexelTruth::new(subject.surface, &*pen, &lattice);
     let last = comparison.sizes.len() - 1;
@@ -46,7 +47,7 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Canvas {
         let peak = true_lobe.iter().copied().fold(1e-12, f64::max);
         plot(&mut canvas, &lattice, (label, y), &true_lobe, peak);
         for (column, row) in comparison.rows.iter().enumerate() {
-            let Ok(method) = ndf::parse(&row.method) else { continue };
+            let Ok(method) = row.method.parse::<AnyMethod>() else { continue };
             let mut lobe = vec![0.0; lattice.len()];
             method
                 .evaluator(&*pen, &lattice.directions)

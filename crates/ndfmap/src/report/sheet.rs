@@ -4,12 +4,12 @@ use glam::DVec3;
 use ndfmap_core::grid::Size;
 use ndfmap_core::measure::TexelTruth;
 use ndfmap_core::metrics::display_value;
-use ndfmap_core::ndf;
 use ndfmap_core::sphere::DiskLattice;
 use rayon::prelude::*;
 
 use super::canvas::{Canvas, LETTER, LINE};
 use crate::measure::{Comparison, Subject, three_digits};
+use ndfmap_core::ndf::AnyMethod;
 
 /// Pixels of a cell's longer side.
 const CELL: usize = 128;
@@ -85,7 +85,7 @@ fn columns(subject: &Subject<'_>, comparison: &Comparison, shown: &[(usize, Size
         errors: vec![String::new(); shown.len()],
     }];
     for row in &comparison.rows {
-        let Ok(method) = ndf::parse(&row.method) else { continue };
+        let Ok(method) = row.method.parse::<AnyMethod>() else { continue };
         let evaluator = method.evaluator(subject.lobe, &lattice.directions);
         let value = |level: usize, x: usize, y: usize| {
             let mut out = [0.0];

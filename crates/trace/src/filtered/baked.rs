@@ -2,7 +2,7 @@
 
 use glam::{DMat2, DVec3};
 use ndfmap_core::lookup::{Lookup, PixelFootprint, Texels};
-use ndfmap_core::ndf::{FilteredTexel, IncidentLight, LocalEnvironment, Method, PreparedBrdf};
+use ndfmap_core::ndf::{FilteredTexel, IncidentLight, LobeLayout, LocalEnvironment, Method, PreparedBrdf};
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{BakedMaterial, Material, SurfaceTextures};
 
@@ -13,6 +13,8 @@ pub(super) struct Baked {
     map: Lookup,
     /// Layers of the method itself; those of attributes follow.
     layers: usize,
+    /// Layout of the lobes that carry colours and roughness; `None` where `params` has them.
+    carriers: Option<LobeLayout>,
     /// Colours and roughness, for methods whose lobes carry none.
     params: Vec<Lookup>,
 }
@@ -41,6 +43,7 @@ impl Baked {
         Self {
             map: Lookup::new(&baked.pyramid),
             layers: method.layers(),
+            carriers: method.lobe_layout().filter(|_| baked.attributes > 0),
             params: baked.params.iter().map(|values| Lookup::of_values(values, wraps)).collect(),
         }
     }
@@ -80,22 +83,17 @@ impl Baked {
         lights: &[IncidentLight],
     ) -> DVec3 {
         let material = shading.material;
-        let params = |layer: Option<usize>| match (&material.textures, layer) {
-            (None, _) => material.params,
-            (Some(_), Some(layer)) if self.params.is_empty() => {
-                // A lobe's attributes are stored times its weight.
-                let weight = channels[4 * layer].max(f32::MIN_POSITIVE);
-                let attribute = |k: usize| {
-                    let from = 4 * ((k + 1) * self.layers + layer);
-                    channels.get(from..from + 4).map(|c| [0, 1, 2, 3].map(|i| c[i] / weight))
-                };
+        let params = |lobe: Option<usize>| match (&material.textures, lobe, self.carriers) {
+            (None, ..) => material.params,
+            (Some(_), Some(lobe), Some(layout)) => {
+                let attribute = |k: usize| layout.attribute(channels, k, lobe);
                 SurfaceTextures::from_channels(
                     attribute(0).unwrap_or_default(),
                     attribute(1),
                     material.params.specular,
                 )
             }
-            (Some(_), _) => SurfaceTextures::from_channels(
+            (Some(_), ..) => SurfaceTextures::from_channels(
                 colours[0],
                 (self.params.len() > 1).then_some(colours[1]),
                 material.params.specular,
@@ -108,8 +106,8 @@ impl Baked {
             at_means: lookups.at_means,
             slope_map: shading.slope_map,
         };
-        let (method, brdf) = (shading.method, &material.brdf);
-        let of_environment = |local| method.reflect_environment(&texel, brdf, local);
-        method.reflect(&texel, brdf, lights) + shading.local.as_ref().map_or(DVec3::ZERO, of_environment)
+        let method = shading.method;
+        let of_environment = |local| method.reflect_environment(&texel, local);
+        method.reflect(&texel, lights) + shading.local.as_ref().map_or(DVec3::ZERO, of_environment)
     }
 }

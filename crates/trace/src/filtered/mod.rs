@@ -46,8 +46,6 @@ const PARTS: usize = 4;
 /// The maps of a scene's materials, baked with one method. Camera, lights, BRDFs, models and meshes may change after.
 pub struct BakedMaps<'a> {
     method: &'a dyn Method,
-    /// The method knows of displacement.
-    displaces: bool,
     materials: Vec<Baked>,
 }
 
@@ -63,11 +61,7 @@ impl<'a> BakedMaps<'a> {
         let count = materials.len() as f64;
         let bake =
             |(i, material)| Baked::new(material, method, precision, &|f| progress((i as f64 + f) / count));
-        Self {
-            method,
-            displaces: method.shader().displaces,
-            materials: materials.iter().enumerate().map(bake).collect(),
-        }
+        Self { method, materials: materials.iter().enumerate().map(bake).collect() }
     }
 }
 
@@ -180,7 +174,7 @@ impl Filtered<'_> {
     fn look(&self, rays: &Rays, at: DVec2) -> Option<(Hit, Place)> {
         let direction = rays.direction(at);
         let hit = self.geometry.hit(rays.eye, direction)?;
-        Some((hit, self.geometry.place(&hit, direction, self.maps.displaces)))
+        Some((hit, self.geometry.place(&hit, direction, self.maps.method.knows_displacement())))
     }
 
     /// A pixel as the mean of its parts.
@@ -206,7 +200,7 @@ impl Filtered<'_> {
         let Some((hit, place)) = hit else { return self.scene.background.as_dvec3() };
         let wo = place.frame.transpose() * -rays.direction(at);
         scratch.lights.clear();
-        let slope_map = place.stretch.filter(|_| self.maps.displaces);
+        let slope_map = place.stretch.filter(|_| self.maps.method.knows_displacement());
         let between = if slope_map.is_some() { Directions::between } else { Directions::new };
         let of_scene = incident_directions(&self.scene.lights, (place.position, place.frame), wo, between);
         let lit = |(directions, irradiance)| IncidentLight { directions, irradiance };

@@ -5,15 +5,16 @@
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
-use ndfmap_core::brdf::{Brdf, ShadingModel, SurfaceParams};
+use ndfmap_core::brdf::{AnyLobe, Brdf, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::Size;
 use ndfmap_core::light::Light;
 use ndfmap_core::metrics::Picture;
+use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::procedural;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{Camera, Material, Mesh, Object, Scene};
 use ndfmap_core::surface::Surface;
 use ndfmap_core::units::SlopeVariance;
-use ndfmap_core::{brdf, ndf, procedural};
 use ndfmap_trace::Geometry;
 use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
 use ndfmap_trace::truth::{Effort, TruePicture, Truth};
@@ -42,7 +43,7 @@ pub(crate) fn plate(surface: Arc<dyn Surface>, lobe: &str, shading: ShadingModel
             },
             textures: None,
             displacement: None,
-            brdf: Brdf { lobe: brdf::parse(lobe).unwrap(), shading },
+            brdf: Brdf { lobe: lobe.parse::<AnyLobe>().unwrap(), shading },
         }],
         lights: vec![Light::Directional {
             towards: DVec3::new(0.3, 0.2, 0.9).normalize(),
@@ -61,7 +62,7 @@ pub(crate) fn truth(scene: &Scene, size: Size, rays: usize, seed: u64) -> TruePi
 
 pub(crate) fn filtered(scene: &Scene, method: &str, size: Size, lookups: Lookups) -> Picture {
     let geometry = Geometry::new(scene);
-    let method = ndf::parse(method).unwrap();
+    let method = method.parse::<AnyMethod>().unwrap();
     let maps = BakedMaps::new(&scene.materials, &*method, Precision::Single, &|_| ());
     Filtered { scene, geometry: &geometry, maps: &maps, progress: &|_| () }.render(
         &scene.camera,

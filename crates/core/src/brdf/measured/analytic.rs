@@ -5,6 +5,8 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
+use super::PublishedFit;
+
 const SGD: &str = include_str!("merl_sgd_fits.csv");
 const ABC: &str = include_str!("merl_abc_fits.csv");
 
@@ -20,8 +22,11 @@ pub(super) fn names() -> Vec<&'static str> {
 }
 
 /// A material by its name.
-pub(super) fn find(model: &str, name: &str) -> Result<Material, String> {
-    let (file, names_in_row) = if model == "sgd" { (SGD, 2) } else { (ABC, 1) };
+pub(super) fn find(fit: PublishedFit, name: &str) -> Result<Material, String> {
+    let (file, names_in_row) = match fit {
+        PublishedFit::Sgd => (SGD, 2),
+        PublishedFit::Abc => (ABC, 1),
+    };
     let row = file.lines().skip(1).find(|row| row.split(',').next() == Some(name)).ok_or_else(|| {
         let all = names();
         let alike =
@@ -32,7 +37,10 @@ pub(super) fn find(model: &str, name: &str) -> Result<Material, String> {
         format!("there is no such material; {which} {}", list.join(", "))
     })?;
     let numbers = row.split(',').skip(names_in_row).map(|t| t.parse().unwrap_or(f64::NAN)).collect();
-    Ok(if model == "sgd" { Material::Sgd(numbers) } else { Material::Abc(numbers) })
+    Ok(match fit {
+        PublishedFit::Sgd => Material::Sgd(numbers),
+        PublishedFit::Abc => Material::Abc(numbers),
+    })
 }
 
 impl Material {

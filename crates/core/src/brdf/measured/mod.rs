@@ -14,16 +14,17 @@ pub use factor::{BINS, Residual, half_angle};
 
 use std::borrow::Cow;
 use std::f64::consts::PI;
-use std::fmt::Write as _;
+use std::fmt::{self, Display, Write as _};
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::{Argument, Lobe, Microfacets, Row, twin};
+use super::{AnyLobe, Lobe, Microfacets, Row, Widen, twin};
 use crate::units::SlopeVariance;
+use crate::words;
 
 /// A measured lobe.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
     /// As on the command line.
     name: String,
@@ -49,7 +50,7 @@ pub(super) const SGD: Row = Row {
     name: "sgd",
     parameter: ":NAME",
     summary: "a MERL material by its fit of Bagher, Soler and Holzschuch 2012, factored, in its own colours",
-    parse: |name| Measured::of_fit("sgd", name),
+    parse: |name| Ok(AnyLobe::from(Measured::published(PublishedFit::Sgd, name)?)),
     samples: &["sgd:blue-fabric", "sgd:gold-metallic-paint"],
 };
 
@@ -57,9 +58,20 @@ pub(super) const ABC: Row = Row {
     name: "abc",
     parameter: ":NAME",
     summary: "a MERL material by its fit of Löw et al. 2012, factored, in its own colours",
-    parse: |name| Measured::of_fit("abc", name),
+    parse: |name| Ok(AnyLobe::from(Measured::published(PublishedFit::Abc, name)?)),
     samples: &["abc:pearl-paint"],
 };
+
+/// Published fits of the hundred MERL materials.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PublishedFit {
+    /// Shifted gamma: Bagher, Soler and Holzschuch 2012.
+    Sgd,
+    /// ABC: Löw et al. 2012.
+    Abc,
+}
+
+words!(PublishedFit { Sgd => "sgd", Abc => "abc" });
 
 /// Names of the materials that there are published fits of.
 #[must_use]
@@ -67,22 +79,26 @@ pub fn materials() -> Vec<&'static str> {
     analytic::names()
 }
 
-/// Reflectance of a published fit, `sgd` or `abc`, for unit directions to the light and the eye about the normal z, RGB.
+/// Reflectance of a published fit for unit directions to the light and the eye about the normal z, RGB.
 ///
 /// # Errors
 /// A sentence that says what is wrong with the name, and which is nearest.
-pub fn published(model: &str, name: &str) -> Result<impl Fn(DVec3, DVec3) -> DVec3 + use<>, String> {
-    analytic::find(model, name).map(|material| move |wi, wo| material.reflectance(wi, wo))
+pub fn published(fit: PublishedFit, name: &str) -> Result<impl Fn(DVec3, DVec3) -> DVec3 + use<>, String> {
+    analytic::find(fit, name).map(|material| move |wi, wo| material.reflectance(wi, wo))
 }
 
 impl Measured {
-    fn of_fit(model: &str, name: &str) -> Result<Box<dyn Lobe>, String> {
-        let reflectance = published(model, name)?;
+    /// The material of this name, factored from a published fit.
+    ///
+    /// # Errors
+    /// A sentence that says what is wrong with the name, and which is nearest.
+    pub fn published(fit: PublishedFit, name: &str) -> Result<Self, String> {
+        let reflectance = published(fit, name)?;
         // The fits do not depend on more than these sixteen tell apart.
-        Ok(Box::new(Self::new(&format!("{model}:{name}"), 16, |wi, wo, _| Some(reflectance(wi, wo)))))
+        Ok(Self::new(&format!("{fit}:{name}"), 16, |wi, wo, _| Some(reflectance(wi, wo))))
     }
 
-    /// LobeFactors a table of measurements: reflectance, RGB, for directions to the light and the eye (the normal is z), which `turns` bins of
+    /// Factors a table of measurements: reflectance, RGB, for directions to the light and the eye (the normal is z), which `turns` bins of
     /// `phi_d` from 0 to 180 degrees are asked for at every pair of `theta_h` and `theta_d`; the third number is the bin's, counted over
     /// all, `(theta_h × 90 + theta_d) × turns + phi_d`. `None` where nothing was measured.
     #[must_use]
@@ -116,37 +132,33 @@ fn colour(tint: &[DVec3; 6], u: f64) -> DVec3 {
     tint.iter().rev().fold(DVec3::ZERO, |sum, c| sum * (1.0 - u) + *c).max(DVec3::ZERO) / (u * u)
 }
 
-impl Lobe for Measured {
-    fn spelling(&self) -> String {
-        self.name.clone()
+impl Display for Measured {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.name)
+    }
+}
+
+impl Widen for Measured {
+    fn widened(&self, by: SlopeVariance) -> Self {
+        Self { widened: self.widened.widen(by), ..self.clone() }
     }
 
-    fn argument(&self) -> Argument {
-        Argument::Half
-    }
-
-    fn evaluate(&self, u: f64) -> f64 {
-        self.evaluate_widened(SlopeVariance::ZERO, u)
-    }
-
-    fn evaluate_all(&self, u: &mut [f64]) {
-        u.iter_mut().for_each(|u| *u = self.evaluate(*u));
-    }
-
-    fn slope_variance(&self) -> Option<SlopeVariance> {
-        Some(SlopeVariance::clamped(self.own_variance()).widen(self.widened))
-    }
-
-    fn widen(&self, by: SlopeVariance) -> Box<dyn Lobe> {
-        Box::new(Self { widened: self.widened.widen(by), ..self.clone() })
-    }
-
-    fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64 {
+    fn value_widened(&self, by: SlopeVariance, u: f64) -> f64 {
         if u <= 0.0 {
             return 0.0;
         }
         let by = self.widened.widen(by).get();
         self.fit.kernels.iter().map(|(weight, variance)| weight * kernel(variance + by, u.min(1.0))).sum()
+    }
+}
+
+impl Lobe for Measured {
+    fn evaluate(&self, u: f64) -> f64 {
+        self.value_widened(SlopeVariance::ZERO, u)
+    }
+
+    fn slope_variance(&self) -> Option<SlopeVariance> {
+        Some(SlopeVariance::clamped(self.own_variance()).widen(self.widened))
     }
 
     fn tint(&self, u: f64) -> DVec3 {

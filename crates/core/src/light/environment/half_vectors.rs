@@ -95,7 +95,8 @@ fn views_around(wo: DVec3) -> ([usize; 4], DVec2) {
 mod tests {
     use super::super::tests::{smooth, smooth_radiance};
     use super::*;
-    use crate::brdf;
+
+    use crate::brdf::AnyLobe;
     use crate::grid::Size;
     use crate::sphere::gauss_legendre;
 
@@ -103,7 +104,7 @@ mod tests {
     fn a_wide_lobe_reflects_the_integral() {
         let e = smooth(Size { width: 256, height: 128 });
         let table = HalfVectors::of(&e);
-        let lobe = brdf::parse("blinn-phong:12").unwrap();
+        let lobe = "blinn-phong:12".parse::<AnyLobe>().unwrap();
         let zonal: [f64; HALF_VECTOR_ORDER + 1] = std::array::from_fn(|l| lobe.zonal(HALF_VECTOR_ORDER)[l]);
         for j in [3, 7, 11] {
             // On a view of the grid, so that nothing is interpolated.
