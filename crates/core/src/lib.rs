@@ -13,8 +13,8 @@
 //! let surface = (procedural::find("v-groove").unwrap().build)(Size::new(64, 64)?);
 //! // Bake it into every level of a representation of your choice ...
 //! let method = "slopes".parse::<AnyMethod>()?;
-//! let bake = Bake { surface: &*surface, method: &*method, precision: Precision::Half, progress: &|_| () };
-//! let (pyramid, _) = bake.to_pyramid();
+//! let bake = Bake::new(&*surface, &*method);
+//! let (pyramid, _) = bake.to_pyramid()?;
 //! // ... and shade the coarsest texel with any BRDF, chosen now and not when baking.
 //! let brdf = "ggx:0.2".parse::<AnyLobe>()?;
 //! let straight_up = [DVec3::Z];
@@ -35,6 +35,7 @@ pub mod lookup;
 pub mod measure;
 pub mod metrics;
 pub mod ndf;
+pub mod observe;
 pub mod procedural;
 pub mod pyramid;
 pub mod scene;

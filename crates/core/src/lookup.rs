@@ -64,6 +64,56 @@ impl Filtering {
     }
 }
 
+/// Who filters maps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sampling {
+    /// Our own taps: the same on every device.
+    Taps(Filtering),
+    /// The device's sampler, with so many taps at most; 1 is plain trilinear filtering. What comes out is the device's choice; a renderer
+    /// without such a device does what [`Self::filtering`] says.
+    Sampler(u16),
+}
+
+impl Sampling {
+    /// Our taps for it: for a sampler those that it is meant to take.
+    #[must_use]
+    pub fn filtering(self) -> Filtering {
+        match self {
+            Self::Taps(filtering) => filtering,
+            Self::Sampler(taps) => Filtering::anisotropic(usize::from(taps.max(1))),
+        }
+    }
+}
+
+/// How a renderer looks maps up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lookups {
+    /// Who filters, and how wide.
+    pub sampling: Sampling,
+    /// Shade every texel that the filter reads and mix the results: the reference for lobes that are not aligned, and the
+    /// only way for what cannot be filtered, which takes it unasked.
+    pub neighbours: bool,
+    /// Take factors at the lobes' means, as the papers print it.
+    pub at_means: bool,
+}
+
+impl Lookups {
+    /// One trilinear tap of our own.
+    pub const TRILINEAR: Self = Self::taps(Filtering::TRILINEAR);
+
+    /// Taps of our own.
+    #[must_use]
+    pub const fn taps(filtering: Filtering) -> Self {
+        Self { sampling: Sampling::Taps(filtering), neighbours: false, at_means: false }
+    }
+
+    /// The device's sampler, with so many taps.
+    #[must_use]
+    pub const fn sampler(taps: u16) -> Self {
+        Self { sampling: Sampling::Sampler(taps), neighbours: false, at_means: false }
+    }
+}
+
 /// A tap of a filter: a place and a level, whose fraction mixes two.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tap {

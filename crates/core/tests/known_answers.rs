@@ -26,8 +26,8 @@ fn flanks() -> [DVec3; 2] {
 /// The effective lobe of the coarsest texel at these directions.
 fn coarsest(surface: &dyn Surface, method: &str, lobe: &str, directions: &[DVec3]) -> Vec<f64> {
     let (method, lobe) = (method.parse::<AnyMethod>().unwrap(), lobe.parse::<AnyLobe>().unwrap());
-    let bake = Bake { surface, method: &*method, precision: Precision::Single, progress: &|_| () };
-    let (pyramid, _) = bake.to_pyramid();
+    let bake = Bake::new(surface, &*method).precision(Precision::Single);
+    let (pyramid, _) = bake.to_pyramid().unwrap();
     let mut out = vec![0.0; directions.len()];
     let texel = pyramid.texel(pyramid.sizes().len() - 1, 0, 0);
     method.evaluator(&*lobe, directions).evaluate(&texel, &mut out);

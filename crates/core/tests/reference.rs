@@ -67,9 +67,8 @@ fn effective_lobes_of_explicit_normals() {
             TexelTruth::new(&surface, &*lobe, &lattice).texel(Size { width: 1, height: 1 }, 0, 0)[0]
         } else {
             let method = method.parse::<AnyMethod>().unwrap();
-            let bake =
-                Bake { surface: &surface, method: &*method, precision: Precision::Single, progress: &|_| () };
-            let (pyramid, _) = bake.to_pyramid();
+            let bake = Bake::new(&surface, &*method).precision(Precision::Single);
+            let (pyramid, _) = bake.to_pyramid().unwrap();
             let last = pyramid.sizes().len() - 1;
             let mut out = [0.0];
             method.evaluator(&*lobe, &w).evaluate(&pyramid.texel(last, 0, 0), &mut out);

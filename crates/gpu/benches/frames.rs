@@ -7,14 +7,14 @@ use std::time::Instant;
 
 use ndfmap_core::grid::Size;
 use ndfmap_core::light::environment::{SceneEnvironment, Technique, builtin};
-use ndfmap_core::lookup::Filtering;
+use ndfmap_core::lookup::{Filtering, Lookups, Sampling};
 use ndfmap_core::metrics::{color_error, relative_l2};
 use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::observe::Unobserved;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{self, Scene, SceneOptions};
+use ndfmap_core::scene::{self, Effort, Scene, SceneOptions};
 use ndfmap_gpu::{
-    Antialiasing, Canvas, Device, Effort, FinestMaps, Geometry, Lookups, Maps, Meshes, Renderer, Sampling,
-    SceneView,
+    Antialiasing, Canvas, Device, FinestMaps, Frame, Geometry, Maps, Meshes, Renderer, SceneView, TrueFrame,
 };
 
 const METHODS: &[&str] = &[
@@ -66,9 +66,14 @@ fn lookups(spelling: &str, sampling: Sampling) -> Lookups {
     Lookups { sampling, neighbours, at_means: false }
 }
 
+/// A frame by the device's own sampler.
+fn frame<'a>(view: SceneView<'a>, maps: &'a Maps) -> Frame<'a> {
+    Frame { view, maps, lookups: Lookups::sampler(1) }
+}
+
 struct Bench<'a> {
     device: &'a Device,
-    renderer: &'a Renderer<'a>,
+    renderer: &'a Renderer,
     runs: usize,
 }
 
@@ -78,9 +83,9 @@ impl Bench<'_> {
         &self,
         scene: &Scene,
         methods: &'m [(&'s str, AnyMethod)],
-    ) -> Outcome<Vec<(&'s str, Maps<'m>)>> {
+    ) -> Outcome<Vec<(&'s str, Maps)>> {
         let bake = |(name, method): &'m (&'s str, AnyMethod)| {
-            let maps = Maps::new(self.device, &scene.materials, &**method, Precision::Half, &|_| ())?;
+            let maps = Maps::new(self.device, &scene.materials, method, Precision::Half, &|_| ())?;
             Ok((*name, maps))
         };
         methods.iter().map(bake).collect()
@@ -89,15 +94,17 @@ impl Bench<'_> {
     /// Median milliseconds of each method's frame, taking turns.
     fn times(
         &self,
-        canvas: &Canvas<'_>,
+        canvas: &Canvas,
         shown: &SceneView<'_>,
-        all: &[(&str, Maps<'_>)],
+        all: &[(&str, Maps)],
         sampling: Sampling,
     ) -> Outcome<Vec<f64>> {
         let mut times = vec![Vec::new(); all.len()];
         for turn in 0..=self.runs {
             for (times, (name, maps)) in times.iter_mut().zip(all) {
-                let ms = self.renderer.time(canvas, shown, maps, lookups(name, sampling))?;
+                let ms = self
+                    .renderer
+                    .time(canvas, &Frame { view: *shown, maps, lookups: lookups(name, sampling) })?;
                 // The first turn makes pipelines and warms up.
                 if turn > 0 {
                     times.push(ms);
@@ -114,18 +121,19 @@ impl Bench<'_> {
         let canvas = Canvas::new(self.device, size, Antialiasing::Sharp)?;
         let parts = Canvas::new(self.device, size, Antialiasing::Parts)?;
         let finest = FinestMaps::new(self.device, &scene.materials)?;
-        let effort = |samples| Effort { samples, noise: 0.0, progress: &|_| () };
-        let truth = self.renderer.truth(&canvas, &shown, &finest, &effort(512))?;
+        let frame = TrueFrame { view: shown, finest: &finest };
+        let brute = |rays| self.renderer.truth(&canvas, &frame, &Effort::rays(rays), &Unobserved);
+        let truth = brute(512)?;
         let least = ndfmap_gpu::LEAST_SAMPLES;
         let once = || -> Outcome<f64> {
             let start = Instant::now();
-            self.renderer.truth(&canvas, &shown, &finest, &effort(least))?;
+            brute(least)?;
             Ok(start.elapsed().as_secs_f64() * 1e3 / least as f64)
         };
         let sample = median((0..self.runs.min(5)).map(|_| once()).collect::<Outcome<Vec<f64>>>()?);
         println!(
             "\n{name} at time {time}, {} x {}; truth of {} samples, noise {:.3}, {sample:.1} ms a sample",
-            size.width, size.height, truth.samples, truth.noise
+            size.width, size.height, truth.rays, truth.noise
         );
         let parsed = parsed(METHODS)?;
         let all = self.maps(&scene, &parsed)?;
@@ -141,11 +149,11 @@ impl Bench<'_> {
         for (filter, sampling) in filters {
             let times = self.times(&canvas, &shown, &all, sampling)?;
             for ((name, maps), ms) in all.iter().zip(&times) {
-                self.renderer.draw(&parts, &shown, maps, lookups(name, sampling))?;
+                self.renderer.draw(&parts, &Frame { view: shown, maps, lookups: lookups(name, sampling) })?;
                 let picture = parts.read()?;
                 let error = relative_l2(&picture, &truth.picture);
                 // Noise falls with the root of the samples: so many have as much of it as the method has error.
-                let samples = truth.samples as f64 * (truth.noise / error).powi(2);
+                let samples = truth.rays as f64 * (truth.noise / error).powi(2);
                 println!(
                     "{name:16} {filter:>10} {ms:>8.2} {:>9.2} {:>12.4} {error:>12.3} {:>22.1}",
                     ms / times[0],
@@ -165,7 +173,7 @@ impl Bench<'_> {
         let canvas = Canvas::new(self.device, size, Antialiasing::Sharp)?;
         let method = "slopes".parse::<AnyMethod>()?;
         let maps =
-            |scene: &Scene| Maps::new(self.device, &scene.materials, &*method, Precision::Half, &|_| ());
+            |scene: &Scene| Maps::new(self.device, &scene.materials, &method, Precision::Half, &|_| ());
         let (flat_maps, maps) = (maps(&flat)?, maps(&scene)?);
         let flat_geometry = Geometry::new(self.device, &flat)?;
         let meshes = Meshes::new(self.device, &scene)?;
@@ -178,9 +186,9 @@ impl Bench<'_> {
             let cutting = begin.elapsed().as_secs_f64() * 1e3;
             triangles = geometry.len();
             let shown = SceneView { scene: &scene, geometry: &geometry, camera: &scene.camera };
-            let drawing = self.renderer.time(&canvas, &shown, &maps, Lookups::TRILINEAR)?;
+            let drawing = self.renderer.time(&canvas, &frame(shown, &maps))?;
             let shown = SceneView { scene: &flat, geometry: &flat_geometry, camera: &flat.camera };
-            let flat_drawing = self.renderer.time(&canvas, &shown, &flat_maps, Lookups::TRILINEAR)?;
+            let flat_drawing = self.renderer.time(&canvas, &frame(shown, &flat_maps))?;
             if turn > 0 {
                 cut.push(cutting);
                 drawn.push(drawing);
@@ -236,7 +244,7 @@ impl Bench<'_> {
         let geometry = Geometry::new(self.device, &scene)?;
         let shown = SceneView { scene: &scene, geometry: &geometry, camera: &scene.camera };
         let method = "vmf:6".parse::<AnyMethod>()?;
-        let all = [("vmf:6", Maps::new(self.device, &scene.materials, &*method, Precision::Half, &|_| ())?)];
+        let all = [("vmf:6", Maps::new(self.device, &scene.materials, &method, Precision::Half, &|_| ())?)];
         for outlines in [Antialiasing::Sharp, Antialiasing::Multisampled] {
             let canvas = Canvas::new(self.device, size, outlines)?;
             let ms = self.times(&canvas, &shown, &all, Sampling::Sampler(1))?[0];
@@ -257,11 +265,11 @@ fn start(spelling: &str, size: Size) -> Outcome<()> {
     let renderer = Renderer::new(&device)?;
     let geometry = Geometry::new(&device, &scene)?;
     let baking = Instant::now();
-    let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ())?;
+    let maps = Maps::new(&device, &scene.materials, &method, Precision::Half, &|_| ())?;
     let baked = baking.elapsed();
     let shown = SceneView { scene: &scene, geometry: &geometry, camera: &scene.camera };
     let canvas = Canvas::new(&device, size, Antialiasing::Multisampled)?;
-    renderer.draw(&canvas, &shown, &maps, Lookups::TRILINEAR)?;
+    renderer.draw(&canvas, &Frame { view: shown, maps: &maps, lookups: Lookups::sampler(1) })?;
     canvas.read()?;
     let all = begin.elapsed();
     println!(

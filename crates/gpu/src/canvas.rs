@@ -27,11 +27,69 @@ impl Antialiasing {
     }
 
     /// Format of the target: half floats for speed, or single ones for the digits.
-    pub(crate) fn format(self) -> wgpu::TextureFormat {
-        match self {
+    pub(crate) fn format(self) -> TargetFormat {
+        let format = match self {
             Self::Multisampled => wgpu::TextureFormat::Rgba16Float,
             Self::Sharp | Self::Parts => wgpu::TextureFormat::Rgba32Float,
-        }
+        };
+        TargetFormat { format, samples: self.samples() }
+    }
+}
+
+/// What a pipeline knows of its target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct TargetFormat {
+    pub(crate) format: wgpu::TextureFormat,
+    pub(crate) samples: u32,
+}
+
+/// What of a target is kept.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Keep {
+    /// Colours before the pass.
+    pub(crate) colours: bool,
+    /// Depths before the pass.
+    pub(crate) depths: bool,
+    /// Depths after it.
+    pub(crate) depths_after: bool,
+}
+
+/// What one pass draws on.
+#[derive(Clone, Copy)]
+pub(crate) struct PassTarget<'a> {
+    pub(crate) view: &'a wgpu::TextureView,
+    pub(crate) resolved: Option<&'a wgpu::TextureView>,
+    pub(crate) depth: &'a wgpu::TextureView,
+    pub(crate) keep: Keep,
+}
+
+/// Texture of the caller's own to draw a frame on: its colours, linear radiance, and how they are to be drawn.
+#[derive(Clone, Copy)]
+pub struct Target<'a> {
+    /// Colours.
+    pub view: &'a wgpu::TextureView,
+    /// Format that the view has. An sRGB format encodes what is drawn, a fixed-point one clamps it.
+    pub format: wgpu::TextureFormat,
+    /// Depths, `Depth32Float`, 1 at the eye and 0 far away; `None` for depths of the renderer's own.
+    pub depth: Option<&'a wgpu::TextureView>,
+    /// Keep what is on the texture (and in the caller's depths) and draw over it; else it is cleared to the scene's background.
+    pub keep: bool,
+}
+
+impl<'a> Target<'a> {
+    /// A texture to be cleared and drawn on, whole.
+    #[must_use]
+    pub fn new(view: &'a wgpu::TextureView, format: wgpu::TextureFormat) -> Self {
+        Self { view, format, depth: None, keep: false }
+    }
+
+    pub(crate) fn size(&self) -> Size {
+        let texture = self.view.texture();
+        Size { width: texture.width() as usize, height: texture.height() as usize }
+    }
+
+    pub(crate) fn target_format(&self) -> TargetFormat {
+        TargetFormat { format: self.format, samples: self.view.texture().sample_count() }
     }
 }
 
@@ -42,8 +100,8 @@ pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 pub(crate) const PLACE: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 
 /// Targets of one size.
-pub struct Canvas<'a> {
-    pub(crate) device: &'a Device,
+pub struct Canvas {
+    pub(crate) device: Device,
     pub(crate) size: Size,
     pub(crate) outlines: Antialiasing,
     /// What passes draw on.
@@ -58,12 +116,12 @@ pub struct Canvas<'a> {
     pub(crate) sums: wgpu::Buffer,
 }
 
-impl<'a> Canvas<'a> {
+impl Canvas {
     /// Makes the targets.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
-    pub fn new(device: &'a Device, size: Size, outlines: Antialiasing) -> Result<Self, GpuError> {
+    pub fn new(device: &Device, size: Size, outlines: Antialiasing) -> Result<Self, GpuError> {
         let extent =
             wgpu::Extent3d { width: size.width as u32, height: size.height as u32, depth_or_array_layers: 1 };
         if size.area() == 0 {
@@ -84,7 +142,7 @@ impl<'a> Canvas<'a> {
             });
             texture.create_view(&wgpu::TextureViewDescriptor::default())
         };
-        let (samples, format) = (outlines.samples(), outlines.format());
+        let TargetFormat { format, samples } = outlines.format();
         let drawn = wgpu::TextureUsages::RENDER_ATTACHMENT;
         let read = wgpu::TextureUsages::TEXTURE_BINDING;
         // Where outlines are not looked for, their targets are but one pixel.
@@ -92,7 +150,7 @@ impl<'a> Canvas<'a> {
         let looked = if outlines == Antialiasing::Parts { extent } else { one };
         let stored = wgpu::TextureUsages::STORAGE_BINDING;
         Ok(Self {
-            device,
+            device: device.clone(),
             size,
             outlines,
             target: texture(extent, format, samples, if samples > 1 { drawn } else { drawn | read }),
@@ -103,6 +161,16 @@ impl<'a> Canvas<'a> {
             mask: texture(looked, wgpu::TextureFormat::R32Uint, 1, stored | read),
             sums,
         })
+    }
+
+    /// What passes draw on.
+    pub(crate) fn pass_target(&self) -> PassTarget<'_> {
+        PassTarget {
+            view: &self.target,
+            resolved: self.resolved.as_ref(),
+            depth: &self.depth,
+            keep: Keep::default(),
+        }
     }
 
     /// The finished picture of a pass.

@@ -4,7 +4,8 @@ use std::sync::{Arc, Mutex};
 
 use crate::GpuError;
 
-/// An opened GPU.
+/// A GPU to draw on: opened by us, or the caller's own. Cloned for nothing.
+#[derive(Clone)]
 pub struct Device {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
@@ -56,8 +57,22 @@ impl Device {
         device.set_device_lost_callback(move |_, message| {
             note(&first, GpuError::Lost { adapter: adapter.clone(), reason: message });
         });
+        Ok(Self { failure, ..Self::from_wgpu(device, queue) })
+    }
+
+    /// The caller's own device, with its queue. Whoever opened it hears of its errors, which we do not listen for; a device with
+    /// [`wgpu::Features::FLOAT32_FILTERABLE`] takes maps of single floats.
+    #[must_use]
+    pub fn from_wgpu(device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        let info = device.adapter_info();
         let software = info.device_type == wgpu::DeviceType::Cpu;
-        Ok(Self { device, queue, name, backend: info.backend, software, failure })
+        Self { device, queue, name: info.name, backend: info.backend, software, failure: Arc::default() }
+    }
+
+    /// The device, as wgpu has it.
+    #[must_use]
+    pub fn wgpu(&self) -> (&wgpu::Device, &wgpu::Queue) {
+        (&self.device, &self.queue)
     }
 
     /// The adapter's name, its interface to us, and whether it is software.
@@ -197,22 +212,21 @@ impl Device {
         })
     }
 
+    /// Commands to be recorded.
+    pub(crate) fn encoder(&self) -> wgpu::CommandEncoder {
+        self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
+    }
+
+    /// Hands recorded commands to the GPU.
+    pub(crate) fn submit(&self, encoder: wgpu::CommandEncoder) {
+        self.queue.submit([encoder.finish()]);
+    }
+
     /// Runs it once for each of `count`, in groups of 64.
     pub(crate) fn dispatch(&self, pipeline: &wgpu::ComputePipeline, group: &wgpu::BindGroup, count: u32) {
-        if count == 0 {
-            return;
-        }
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, group, &[]);
-            // Groups in a row are few by the standard: the rest goes to rows.
-            let groups = count.div_ceil(64);
-            let columns = groups.min(GROUPS_IN_A_ROW);
-            pass.dispatch_workgroups(columns, groups.div_ceil(columns), 1);
-        }
-        self.queue.submit([encoder.finish()]);
+        let mut encoder = self.encoder();
+        record_dispatch(&mut encoder, pipeline, group, count);
+        self.submit(encoder);
     }
 
     /// The bytes of a buffer, once all work is done.
@@ -223,9 +237,9 @@ impl Device {
             usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder = self.encoder();
         encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
-        self.queue.submit([encoder.finish()]);
+        self.submit(encoder);
         let mapped = Arc::new(Mutex::new(None));
         let result = mapped.clone();
         staging.map_async(wgpu::MapMode::Read, .., move |r| {
@@ -242,6 +256,25 @@ impl Device {
             None => Err(driver("it never finished".to_owned())),
         }
     }
+}
+
+/// Records a run of a compute shader, once for each of `count`, in groups of 64.
+pub(crate) fn record_dispatch(
+    encoder: &mut wgpu::CommandEncoder,
+    pipeline: &wgpu::ComputePipeline,
+    group: &wgpu::BindGroup,
+    count: u32,
+) {
+    if count == 0 {
+        return;
+    }
+    let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+    pass.set_pipeline(pipeline);
+    pass.set_bind_group(0, group, &[]);
+    // Groups in a row are few by the standard: the rest goes to rows.
+    let groups = count.div_ceil(64);
+    let columns = groups.min(GROUPS_IN_A_ROW);
+    pass.dispatch_workgroups(columns, groups.div_ceil(columns), 1);
 }
 
 /// Keeps the first error; a lost device explains all others.

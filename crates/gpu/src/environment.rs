@@ -33,8 +33,8 @@ pub(crate) struct Bound {
 }
 
 /// Environments that have been uploaded: the last one, and its cubes.
-pub(crate) struct Environments<'a> {
-    device: &'a Device,
+pub(crate) struct Environments {
+    device: Device,
     pub(crate) sampler: wgpu::Sampler,
     dark_cube: wgpu::TextureView,
     dark: wgpu::TextureView,
@@ -55,8 +55,8 @@ fn scale(environment: &FilteredEnvironment) -> f32 {
     (brightest / 60_000.0).max(1.0)
 }
 
-impl<'a> Environments<'a> {
-    pub(crate) fn new(device: &'a Device) -> Result<Self, GpuError> {
+impl Environments {
+    pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         let one = Size { width: 1, height: 1 };
         let stored = |layers, format| Stored { layers, levels: 1, format };
         let cube = create(device, "no cube", one, stored(6, wgpu::TextureFormat::Rgba16Float))?;
@@ -68,7 +68,7 @@ impl<'a> Environments<'a> {
             ..wgpu::SamplerDescriptor::default()
         });
         Ok(Self {
-            device,
+            device: device.clone(),
             sampler,
             dark_cube: array_view(&cube),
             dark: table.create_view(&wgpu::TextureViewDescriptor::default()),
@@ -167,8 +167,8 @@ impl<'a> Environments<'a> {
 
     fn table(&self, what: &str, size: Size, texels: &[[f32; 4]]) -> Result<wgpu::TextureView, GpuError> {
         let stored = Stored { layers: 1, levels: 1, format: wgpu::TextureFormat::Rgba32Float };
-        let texture = create(self.device, what, size, stored)?;
-        write(self.device, &texture, 0, size, bytemuck::cast_slice(texels));
+        let texture = create(&self.device, what, size, stored)?;
+        write(&self.device, &texture, 0, size, bytemuck::cast_slice(texels));
         Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
     }
 
@@ -176,13 +176,13 @@ impl<'a> Environments<'a> {
         let levels = cube.levels();
         let side = |level: usize| Size { width: cube.side() >> level, height: cube.side() >> level };
         let stored = Stored { layers: 6, levels, format: wgpu::TextureFormat::Rgba16Float };
-        let texture = create(self.device, what, side(0), stored)?;
+        let texture = create(&self.device, what, side(0), stored)?;
         for level in 0..levels {
             let values: Vec<f32> =
                 cube.texels(level).iter().flat_map(|v| (*v / scale).extend(1.0).to_array()).collect();
             let mut halves = vec![f16::ZERO; values.len()];
             halves.convert_from_f32_slice(&values);
-            write(self.device, &texture, level as u32, side(level), bytemuck::cast_slice(&halves));
+            write(&self.device, &texture, level as u32, side(level), bytemuck::cast_slice(&halves));
         }
         Ok(array_view(&texture))
     }

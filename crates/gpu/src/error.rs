@@ -2,7 +2,11 @@
 
 /// A failure of the GPU, or of what was asked of it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum GpuError {
+    /// The observer wanted no more.
+    #[error(transparent)]
+    Cancelled(#[from] ndfmap_core::observe::Cancelled),
     /// No adapter, not even a software one.
     #[error(
         "there is no GPU that can be used, and no software one (such as lavapipe, package mesa-vulkan-drivers)"

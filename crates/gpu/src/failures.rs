@@ -1,10 +1,11 @@
 //! Tests: what goes wrong on a device comes back as an error that says what.
 
 use ndfmap_core::grid::Size;
+use ndfmap_core::lookup::Lookups;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{self, Scene, SceneOptions};
 
-use crate::{Antialiasing, Canvas, Device, Geometry, GpuError, Lookups, Maps, Renderer, SceneView};
+use crate::{Antialiasing, Canvas, Device, Frame, Geometry, GpuError, Maps, Renderer, SceneView};
 use ndfmap_core::ndf::AnyMethod;
 
 /// A device with only some of the features we use; `None` skips, where the tests are not told to insist.
@@ -30,7 +31,7 @@ fn a_map_that_is_too_large_is_named() {
     let Some(device) = device(wgpu::Features::empty()) else { return };
     let scene = foil(Size { width: 40_000, height: 1 });
     let method = "naive".parse::<AnyMethod>().unwrap();
-    let failed = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).err().unwrap();
+    let failed = Maps::new(&device, &scene.materials, &method, Precision::Half, &|_| ()).err().unwrap();
     assert!(matches!(failed, GpuError::TooLarge { width: 40_000, .. }), "{failed}");
     let said = failed.to_string();
     assert!(said.starts_with("the map of material `foil` of 40000 × 1 in 2 layers is too large"), "{said}");
@@ -42,7 +43,7 @@ fn a_map_that_is_too_large_is_named() {
 fn without_filtering_of_floats_half_floats_are_asked_for() {
     let Some(device) = device(wgpu::Features::empty()) else { return };
     let (scene, method) = (foil(SMALL), "naive".parse::<AnyMethod>().unwrap());
-    let with = |precision| Maps::new(&device, &scene.materials, &*method, precision, &|_| ());
+    let with = |precision| Maps::new(&device, &scene.materials, &method, precision, &|_| ());
     let failed = with(Precision::Single).err().unwrap();
     assert!(matches!(failed, GpuError::Unsupported { .. }));
     assert!(
@@ -57,12 +58,14 @@ fn frames_are_timed_with_and_without_a_clock_on_the_device() {
     for features in [wgpu::Features::empty(), wgpu::Features::TIMESTAMP_QUERY] {
         let Some(device) = device(features) else { return };
         let (scene, method) = (foil(SMALL), "naive".parse::<AnyMethod>().unwrap());
-        let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
+        let maps = Maps::new(&device, &scene.materials, &method, Precision::Half, &|_| ()).unwrap();
         let geometry = Geometry::new(&device, &scene).unwrap();
         let shown = SceneView { scene: &scene, geometry: &geometry, camera: &scene.camera };
         let canvas = Canvas::new(&device, SMALL, Antialiasing::Sharp).unwrap();
         let renderer = Renderer::new(&device).unwrap();
-        let ms = renderer.time(&canvas, &shown, &maps, Lookups::TRILINEAR).unwrap();
+        let ms = renderer
+            .time(&canvas, &Frame { view: shown, maps: &maps, lookups: Lookups::sampler(1) })
+            .unwrap();
         assert!(ms > 0.0 && ms < 1e4, "{ms}");
     }
 }
@@ -71,13 +74,13 @@ fn frames_are_timed_with_and_without_a_clock_on_the_device() {
 fn a_lost_device_is_an_error() {
     let Some(device) = device(wgpu::Features::empty()) else { return };
     let (scene, method) = (foil(SMALL), "naive".parse::<AnyMethod>().unwrap());
-    let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
+    let maps = Maps::new(&device, &scene.materials, &method, Precision::Half, &|_| ()).unwrap();
     let geometry = Geometry::new(&device, &scene).unwrap();
     let renderer = Renderer::new(&device).unwrap();
     let canvas = Canvas::new(&device, SMALL, Antialiasing::Sharp).unwrap();
     device.device.destroy();
     let shown = SceneView { scene: &scene, geometry: &geometry, camera: &scene.camera };
-    let drawn = renderer.draw(&canvas, &shown, &maps, Lookups::TRILINEAR);
+    let drawn = renderer.draw(&canvas, &Frame { view: shown, maps: &maps, lookups: Lookups::sampler(1) });
     let failed = drawn.and_then(|()| canvas.read()).err().unwrap();
     assert!(failed.to_string().contains("lost"), "{failed}");
 }

@@ -19,11 +19,12 @@ mod tessellation;
 mod truth;
 mod uniforms;
 
-pub use canvas::{Antialiasing, Canvas};
+pub use canvas::{Antialiasing, Canvas, Target};
 pub use device::Device;
 pub use error::GpuError;
 pub use geometry::Geometry;
 pub use maps::Maps;
-pub use renderer::{Lookups, Renderer, Sampling, SceneView};
+pub use renderer::{Frame, Renderer, SceneView};
 pub use tessellation::Meshes;
-pub use truth::{Effort, FinestMaps, LEAST_SAMPLES, TruePicture};
+pub use truth::{FinestMaps, LEAST_SAMPLES, TrueFrame};
+pub use wgpu;

@@ -1,10 +1,15 @@
 //! Baked materials in the GPU's memory: 2-D array textures with all their levels, filtered by the hardware.
 
+use std::sync::{Arc, Mutex};
+
 use half::f16;
 use half::slice::HalfFloatSliceExt;
+use ndfmap_core::brdf::{Brdf, SurfaceParams};
 use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::light::environment::{FilteredEnvironment, Technique};
 use ndfmap_core::lookup::{Lookup, Texels};
-use ndfmap_core::ndf::Method;
+use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::observe::Observer;
 use ndfmap_core::pyramid::{Precision, Pyramid};
 use ndfmap_core::scene::{BakedMaterial, Material, SurfaceTextures};
 use ndfmap_core::surface::{SurfaceRow, Wrap, Wraps};
@@ -24,34 +29,61 @@ pub(crate) struct Textures {
     pub(crate) roughness: Option<(SlopeVariance, SlopeVariance)>,
     pub(crate) size: Size,
     pub(crate) wraps: Wraps,
+    /// What the last frame bound.
+    pub(crate) bound: Mutex<Option<(BindKey, wgpu::BindGroup)>>,
+}
+
+/// What a material's group is made of, besides its textures: while it is the same, so is the group.
+#[derive(Clone, PartialEq)]
+pub(crate) struct BindKey {
+    /// Number of the renderer.
+    pub(crate) renderer: u64,
+    pub(crate) brdf: Brdf,
+    pub(crate) params: SurfaceParams,
+    pub(crate) at_means: bool,
+    /// Taps of the device's sampler.
+    pub(crate) taps: u16,
+    /// What the environment makes of the material: which environment, by its place in memory, and how highlights look it up.
+    pub(crate) environment: Option<Surrounding>,
+}
+
+/// An environment, held so that its place in memory is no other's.
+#[derive(Clone)]
+pub(crate) struct Surrounding(pub(crate) Arc<FilteredEnvironment>, pub(crate) Technique);
+
+impl PartialEq for Surrounding {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0) && self.1 == other.1
+    }
 }
 
 /// The maps of a scene's materials, baked with one method. Camera, lights, lobes, models and meshes may change after, and colours and
 /// roughness but for this: a material keeps the `textures` that it was baked with, or has none still.
-pub struct Maps<'a> {
-    pub(crate) method: &'a dyn Method,
+pub struct Maps {
+    pub(crate) method: AnyMethod,
     pub(crate) materials: Vec<Textures>,
 }
 
-impl<'a> Maps<'a> {
-    /// Bakes every material's map and uploads it; `progress` is told the fraction done.
+impl Maps {
+    /// Bakes every material's map and uploads it.
     ///
     /// # Errors
-    /// [`GpuError`] for maps that the device cannot hold or filter.
+    /// [`GpuError`] for maps that the device cannot hold or filter, and where the observer wants no more.
     pub fn new(
         device: &Device,
         materials: &[Material],
-        method: &'a dyn Method,
+        method: &AnyMethod,
         precision: Precision,
-        progress: &(dyn Fn(f64) + Sync),
+        observer: &dyn Observer,
     ) -> Result<Self, GpuError> {
         let count = materials.len() as f64;
         let one = |(i, material): (usize, &Material)| {
-            let progress = |f: f64| progress((i as f64 + f) / count);
-            let baked = BakedMaterial::new(material, method, precision, &progress);
+            let part = observer.part(i as f64 / count, (i + 1) as f64 / count);
+            let baked = BakedMaterial::new(material, &**method, precision, &part)?;
             Textures::new(device, material, &baked)
         };
-        Ok(Self { method, materials: materials.iter().enumerate().map(one).collect::<Result<_, _>>()? })
+        let materials = materials.iter().enumerate().map(one).collect::<Result<_, GpuError>>()?;
+        Ok(Self { method: method.clone(), materials })
     }
 }
 
@@ -66,6 +98,7 @@ impl Textures {
             roughness: material.textures.as_ref().map(SurfaceTextures::roughness_range),
             size: baked.pyramid.sizes()[0],
             wraps: baked.pyramid.wraps(),
+            bound: Mutex::default(),
         })
     }
 
@@ -91,6 +124,7 @@ impl Textures {
             roughness: None,
             size,
             wraps,
+            bound: Mutex::default(),
         })
     }
 }

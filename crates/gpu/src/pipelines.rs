@@ -6,14 +6,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 use ndfmap_core::brdf::Lobe;
 use ndfmap_core::ndf::Method;
 
-use crate::canvas::{Antialiasing, DEPTH, PLACE};
+use crate::canvas::{Antialiasing, DEPTH, PLACE, TargetFormat};
 use crate::{Device, GpuError, link};
 
 /// What a pipeline is kept under.
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub(crate) enum Key {
-    /// A method (its spelling), a lobe (its text), attributes, the entry point, outlines.
-    Draw(String, String, usize, &'static str, u32),
+    /// A method (its spelling), a lobe (its text), attributes, the entry point, the target.
+    Draw(String, String, usize, &'static str, TargetFormat),
     /// The truth of a lobe.
     Truth(String),
     /// Places and faces.
@@ -21,8 +21,8 @@ pub(crate) enum Key {
 }
 
 /// Layouts that all pipelines share, and the pipelines.
-pub(crate) struct Pipelines<'a> {
-    device: &'a Device,
+pub(crate) struct Pipelines {
+    device: Device,
     /// Group 0: view, lights, triangles, mask, environment.
     pub(crate) scene: wgpu::BindGroupLayout,
     /// Group 1 of [`Key::Draw`]: material, map, colours, sampler, what it makes of an environment.
@@ -48,8 +48,8 @@ fn texture(sample_type: wgpu::TextureSampleType, array: bool) -> wgpu::BindingTy
     wgpu::BindingType::Texture { sample_type, view_dimension, multisampled: false }
 }
 
-impl<'a> Pipelines<'a> {
-    pub(crate) fn new(device: &'a Device) -> Self {
+impl Pipelines {
+    pub(crate) fn new(device: &Device) -> Self {
         let uniform = || buffer(wgpu::BufferBindingType::Uniform);
         let storage = || buffer(wgpu::BufferBindingType::Storage { read_only: true });
         let float = |filterable| wgpu::TextureSampleType::Float { filterable };
@@ -91,7 +91,7 @@ impl<'a> Pipelines<'a> {
                 entry(2, texture(float(true), true)),
             ],
         );
-        Self { device, scene, material, finest, made: Mutex::default() }
+        Self { device: device.clone(), scene, material, finest, made: Mutex::default() }
     }
 
     /// The pipeline that draws a method with a lobe.
@@ -100,15 +100,16 @@ impl<'a> Pipelines<'a> {
         (method, lobe): (&dyn Method, &dyn Lobe),
         attributes: usize,
         entry: &'static str,
-        outlines: Antialiasing,
+        target: TargetFormat,
     ) -> Result<Arc<wgpu::RenderPipeline>, GpuError> {
-        let key =
-            Key::Draw(method.to_string(), lobe.shader().into_owned(), attributes, entry, outlines.samples());
+        let key = Key::Draw(method.to_string(), lobe.shader().into_owned(), attributes, entry, target);
         self.get(key, || {
             let text = link::draw(method, lobe, attributes)?.text;
-            let targets = [outlines.format()];
             let groups = [&self.scene, &self.material];
-            Ok(build(self.device, &Plan { text: &text, entry, targets: &targets, groups: &groups, outlines }))
+            let TargetFormat { format, samples } = target;
+            let descriptor =
+                PipelineDescriptor { text: &text, entry, targets: &[format], groups: &groups, samples };
+            Ok(build(&self.device, &descriptor))
         })
     }
 
@@ -116,11 +117,11 @@ impl<'a> Pipelines<'a> {
     pub(crate) fn truth(&self, lobe: &dyn Lobe) -> Result<Arc<wgpu::RenderPipeline>, GpuError> {
         self.get(Key::Truth(lobe.shader().into_owned()), || {
             let text = link::truth(lobe)?.text;
-            let outlines = Antialiasing::Sharp;
-            let targets = [outlines.format()];
-            let groups = [&self.scene, &self.finest];
-            let plan = Plan { text: &text, entry: "truth", targets: &targets, groups: &groups, outlines };
-            Ok(build(self.device, &plan))
+            let TargetFormat { format, samples } = Antialiasing::Sharp.format();
+            let (entry, groups) = ("truth", [&self.scene, &self.finest]);
+            let descriptor =
+                PipelineDescriptor { text: &text, entry, targets: &[format], groups: &groups, samples };
+            Ok(build(&self.device, &descriptor))
         })
     }
 
@@ -128,11 +129,15 @@ impl<'a> Pipelines<'a> {
     pub(crate) fn place(&self) -> Result<Arc<wgpu::RenderPipeline>, GpuError> {
         self.get(Key::Place, || {
             let text = link::place()?.text;
-            let outlines = Antialiasing::Sharp;
-            let groups = [&self.scene];
-            let plan =
-                Plan { text: &text, entry: "place", targets: &[PLACE, PLACE], groups: &groups, outlines };
-            Ok(build(self.device, &plan))
+            let (entry, groups) = ("place", [&self.scene]);
+            let descriptor = PipelineDescriptor {
+                text: &text,
+                entry,
+                targets: &[PLACE, PLACE],
+                groups: &groups,
+                samples: 1,
+            };
+            Ok(build(&self.device, &descriptor))
         })
     }
 
@@ -152,15 +157,15 @@ impl<'a> Pipelines<'a> {
 }
 
 /// What a pipeline is built from.
-struct Plan<'a> {
+struct PipelineDescriptor<'a> {
     text: &'a str,
     entry: &'static str,
     targets: &'a [wgpu::TextureFormat],
     groups: &'a [&'a wgpu::BindGroupLayout],
-    outlines: Antialiasing,
+    samples: u32,
 }
 
-fn build(device: &Device, plan: &Plan<'_>) -> wgpu::RenderPipeline {
+fn build(device: &Device, plan: &PipelineDescriptor<'_>) -> wgpu::RenderPipeline {
     let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(plan.entry),
         source: wgpu::ShaderSource::Wgsl(plan.text.into()),
@@ -190,10 +195,7 @@ fn build(device: &Device, plan: &Plan<'_>) -> wgpu::RenderPipeline {
             stencil: wgpu::StencilState::default(),
             bias: wgpu::DepthBiasState::default(),
         }),
-        multisample: wgpu::MultisampleState {
-            count: plan.outlines.samples(),
-            ..wgpu::MultisampleState::default()
-        },
+        multisample: wgpu::MultisampleState { count: plan.samples, ..wgpu::MultisampleState::default() },
         fragment: Some(wgpu::FragmentState {
             module: &module,
             entry_point: Some(plan.entry),

@@ -1,44 +1,25 @@
 //! Drawing: a scene's triangles, through baked maps or as they are, on a canvas.
 
-use glam::DVec2;
-use ndfmap_core::lookup::Filtering;
-use ndfmap_core::scene::{Camera, Material, Scene};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
+use glam::DVec2;
+use ndfmap_core::grid::Size;
 use ndfmap_core::light::SplitSum;
 use ndfmap_core::light::environment::SceneEnvironment;
+use ndfmap_core::lookup::{Lookups, Sampling};
+use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::scene::{Camera, Material, Scene};
+use ndfmap_core::surface::Wraps;
 
-use crate::canvas::{Antialiasing, Canvas, PARTS};
+use crate::canvas::{Antialiasing, Canvas, DEPTH, Keep, PARTS, PassTarget, Target, TargetFormat};
+use crate::device::record_dispatch;
 use crate::environment::Environments;
 use crate::geometry::Geometry;
-use crate::maps::{Maps, Textures, sampler};
+use crate::maps::{BindKey, Maps, Surrounding, Textures, sampler};
 use crate::pipelines::Pipelines;
 use crate::uniforms::{self, LightUniform, View};
 use crate::{Device, GpuError};
-
-/// Who filters maps.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Sampling {
-    /// Our own taps: the same on every device, and as the CPU renderer has them.
-    Taps(Filtering),
-    /// The device's sampler, with so many taps at most; 1 is plain trilinear filtering. What comes out is the device's choice.
-    Sampler(u16),
-}
-
-/// How maps are looked up.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lookups {
-    /// Who filters.
-    pub sampling: Sampling,
-    /// Shade every texel that the filter reads and mix the results; methods that cannot be filtered take it unasked.
-    pub neighbours: bool,
-    /// Take factors at the lobes' means, as the papers print it.
-    pub at_means: bool,
-}
-
-impl Lookups {
-    /// The device's own trilinear filter.
-    pub const TRILINEAR: Self = Self { sampling: Sampling::Sampler(1), neighbours: false, at_means: false };
-}
 
 /// A scene as it is now. Its triangles are those of `geometry`; materials, lights and background may have changed since.
 #[derive(Clone, Copy)]
@@ -51,25 +32,49 @@ pub struct SceneView<'a> {
     pub camera: &'a Camera,
 }
 
-/// Draws. Keeps what is made for one frame and good for the next.
-pub struct Renderer<'a> {
-    device: &'a Device,
-    pipelines: Pipelines<'a>,
+/// A frame to be drawn: a scene, seen through baked maps.
+#[derive(Clone, Copy)]
+pub struct Frame<'a> {
+    /// The scene.
+    pub view: SceneView<'a>,
+    /// The maps of its materials, baked on the renderer's device.
+    pub maps: &'a Maps,
+    /// How they are looked up.
+    pub lookups: Lookups,
+}
+
+/// Renderer on one device. Keeps what is made for one frame and good for the next: pipelines, samplers, groups, environments.
+pub struct Renderer {
+    device: Device,
+    /// Number that no other renderer has.
+    number: u64,
+    pipelines: Pipelines,
     accumulate: wgpu::ComputePipeline,
     outlines: wgpu::ComputePipeline,
-    environments: Environments<'a>,
+    environments: Environments,
+    samplers: Mutex<Vec<(SamplerKey, wgpu::Sampler)>>,
+    /// Depths for targets that come without.
+    depth: Mutex<Option<wgpu::TextureView>>,
     /// Stands for a mask where there is none.
     no_mask: wgpu::TextureView,
 }
 
+/// What a sampler is made of.
+#[derive(Clone, Copy, PartialEq)]
+struct SamplerKey {
+    wraps: Wraps,
+    taps: u16,
+}
+
 /// What a pass draws with: for each material its pipeline and its group.
 pub(crate) struct MaterialBindings {
-    pipeline: std::sync::Arc<wgpu::RenderPipeline>,
+    pipeline: Arc<wgpu::RenderPipeline>,
     group: wgpu::BindGroup,
 }
 
 /// One pass over all triangles.
 pub(crate) struct Pass<'a> {
+    pub(crate) target: PassTarget<'a>,
     pub(crate) view: View,
     /// For each material.
     pub(crate) bindings: &'a [MaterialBindings],
@@ -77,62 +82,99 @@ pub(crate) struct Pass<'a> {
     pub(crate) clock: Option<&'a wgpu::QuerySet>,
 }
 
-impl<'a> Renderer<'a> {
+/// How a picture joins the sums before it.
+#[derive(Clone, Copy)]
+pub(crate) struct Weights {
+    /// Part of the sums that stays.
+    pub(crate) keep: f32,
+    /// Part of the picture that is added.
+    pub(crate) add: f32,
+}
+
+impl Renderer {
     /// Prepares to draw.
     ///
     /// # Errors
     /// [`GpuError`] when there is no room for the least textures.
-    pub fn new(device: &'a Device) -> Result<Self, GpuError> {
-        let no_mask = device.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("no mask"),
-            size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::R32Uint,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
+    pub fn new(device: &Device) -> Result<Self, GpuError> {
+        static NUMBERS: AtomicU64 = AtomicU64::new(0);
+        let one = Size { width: 1, height: 1 };
+        let read = wgpu::TextureUsages::TEXTURE_BINDING;
+        let no_mask = TargetFormat { format: wgpu::TextureFormat::R32Uint, samples: 1 };
         Ok(Self {
-            device,
+            number: NUMBERS.fetch_add(1, Ordering::Relaxed),
             environments: Environments::new(device)?,
             pipelines: Pipelines::new(device),
             accumulate: device.compute_pipeline(include_str!("passes/accumulate.wgsl")),
             outlines: device.compute_pipeline(include_str!("passes/outlines.wgsl")),
-            no_mask: no_mask.create_view(&wgpu::TextureViewDescriptor::default()),
+            samplers: Mutex::default(),
+            depth: Mutex::default(),
+            no_mask: texture(device, one, no_mask, read),
+            device: device.clone(),
         })
+    }
+
+    /// Records a frame, one sample of shading a pixel, into the caller's commands: nothing is submitted, and nothing waited for.
+    ///
+    /// What is recorded is the scene as it is now. Materials whose BRDF, colours and environment are those of the last frame take nothing
+    /// from the processor but the look at them.
+    ///
+    /// # Errors
+    /// [`GpuError`] for a shader that does not hold together, or textures that the device cannot hold.
+    pub fn record(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        target: &Target<'_>,
+        frame: &Frame<'_>,
+    ) -> Result<(), GpuError> {
+        let Frame { view: shown, lookups, .. } = frame;
+        let (size, format) = (target.size(), target.target_format());
+        let bindings = self.bind_materials(frame, format)?;
+        let view = View::new(shown.camera, size, shown.geometry).on(format.format, lookups.sampling);
+        let own;
+        let depth = match target.depth {
+            Some(depth) => depth,
+            None => {
+                own = self.own_depth(size, format.samples);
+                &own
+            }
+        };
+        let own = target.depth.is_none();
+        let keep = Keep { colours: target.keep, depths: target.keep && !own, depths_after: !own };
+        let target = PassTarget { view: target.view, resolved: None, depth, keep };
+        self.pass(encoder, shown, &Pass { target, view, bindings: &bindings, clock: None })
     }
 
     /// Draws a picture; [`Canvas::read`] has it. Waits for the picture before, so that no queue grows without end.
     ///
     /// # Errors
     /// [`GpuError`].
-    pub fn draw(
-        &self,
-        canvas: &Canvas<'_>,
-        shown: &SceneView<'_>,
-        maps: &Maps<'_>,
-        lookups: Lookups,
-    ) -> Result<(), GpuError> {
+    pub fn draw(&self, canvas: &Canvas, frame: &Frame<'_>) -> Result<(), GpuError> {
+        let Frame { view: shown, lookups, .. } = frame;
         self.device.wait()?;
-        let bindings = self.bind_materials(shown.scene, maps, lookups, canvas.outlines)?;
-        let view = View::new(shown.camera, canvas.size, shown.geometry).on(canvas, lookups.sampling);
-        self.pass(canvas, shown, &Pass { view, bindings: &bindings, clock: None })?;
-        self.add(canvas, (0.0, 1.0), false);
-        if canvas.outlines != Antialiasing::Parts {
-            return Ok(());
+        let format = canvas.outlines.format();
+        let bindings = self.bind_materials(frame, format)?;
+        let on = |view: View| view.on(format.format, lookups.sampling);
+        let view = on(View::new(shown.camera, canvas.size, shown.geometry));
+        let pass = |view| Pass { target: canvas.pass_target(), view, bindings: &bindings, clock: None };
+        let mut encoder = self.device.encoder();
+        self.pass(&mut encoder, shown, &pass(view))?;
+        self.add(&mut encoder, canvas, Weights { keep: 0.0, add: 1.0 }, false);
+        if canvas.outlines == Antialiasing::Parts {
+            self.find_outlines(&mut encoder, canvas, shown, view)?;
+            let share = 1.0 / (PARTS * PARTS) as f32;
+            for i in 0..PARTS * PARTS {
+                let part = DVec2::new((i % PARTS) as f64, (i / PARTS) as f64);
+                let offset = (part + 0.5) / PARTS as f64 - 0.5;
+                let camera = Camera { shift: shown.camera.shift - offset, ..*shown.camera };
+                let moved = View::new(&camera, canvas.size, shown.geometry);
+                let view = View { width: 1.0 / PARTS as f32, masked: 1, ..on(moved) };
+                self.pass_masked(&mut encoder, shown, &pass(view), &canvas.mask)?;
+                let keep = if i == 0 { 0.0 } else { 1.0 };
+                self.add(&mut encoder, canvas, Weights { keep, add: share }, true);
+            }
         }
-        self.find_outlines(canvas, shown, view)?;
-        let share = 1.0 / (PARTS * PARTS) as f32;
-        for i in 0..PARTS * PARTS {
-            let part = DVec2::new((i % PARTS) as f64, (i / PARTS) as f64);
-            let offset = (part + 0.5) / PARTS as f64 - 0.5;
-            let camera = Camera { shift: shown.camera.shift - offset, ..*shown.camera };
-            let moved = View::new(&camera, canvas.size, shown.geometry);
-            let view = View { width: 1.0 / PARTS as f32, masked: 1, ..moved.on(canvas, lookups.sampling) };
-            self.pass(canvas, shown, &Pass { view, bindings: &bindings, clock: None })?;
-            self.add(canvas, (if i == 0 { 0.0 } else { 1.0 }, share), true);
-        }
+        self.device.submit(encoder);
         Ok(())
     }
 
@@ -141,16 +183,18 @@ impl<'a> Renderer<'a> {
     ///
     /// # Errors
     /// [`GpuError`].
-    pub fn time(
-        &self,
-        canvas: &Canvas<'_>,
-        shown: &SceneView<'_>,
-        maps: &Maps<'_>,
-        lookups: Lookups,
-    ) -> Result<f64, GpuError> {
-        let bindings = self.bind_materials(shown.scene, maps, lookups, canvas.outlines)?;
-        let view = View::new(shown.camera, canvas.size, shown.geometry).on(canvas, lookups.sampling);
-        self.clocked(|clock| self.pass(canvas, shown, &Pass { view, bindings: &bindings, clock }))
+    pub fn time(&self, canvas: &Canvas, frame: &Frame<'_>) -> Result<f64, GpuError> {
+        let Frame { view: shown, lookups, .. } = frame;
+        let format = canvas.outlines.format();
+        let bindings = self.bind_materials(frame, format)?;
+        let view = View::new(shown.camera, canvas.size, shown.geometry).on(format.format, lookups.sampling);
+        self.clocked(|clock| {
+            let mut encoder = self.device.encoder();
+            let pass = Pass { target: canvas.pass_target(), view, bindings: &bindings, clock };
+            self.pass(&mut encoder, shown, &pass)?;
+            self.device.submit(encoder);
+            Ok(())
+        })
     }
 
     /// Milliseconds of one pass.
@@ -158,7 +202,7 @@ impl<'a> Renderer<'a> {
         &self,
         pass: impl FnOnce(Option<&wgpu::QuerySet>) -> Result<(), GpuError>,
     ) -> Result<f64, GpuError> {
-        let device = self.device;
+        let device = &self.device;
         device.wait()?;
         if !device.has_timestamps() {
             let start = std::time::Instant::now();
@@ -178,9 +222,9 @@ impl<'a> Renderer<'a> {
             usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
             mapped_at_creation: false,
         });
-        let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder = device.encoder();
         encoder.resolve_query_set(&queries, 0..2, &stamps, 0);
-        device.queue.submit([encoder.finish()]);
+        device.submit(encoder);
         let stamps: Vec<u64> = bytemuck::pod_collect_to_vec(&device.read(&stamps)?);
         let ticks = stamps[1].saturating_sub(stamps[0]);
         Ok(ticks as f64 * f64::from(device.queue.get_timestamp_period()) / 1e6)
@@ -189,39 +233,90 @@ impl<'a> Renderer<'a> {
     /// Pipelines and groups of the scene's materials, for a method.
     fn bind_materials(
         &self,
-        scene: &Scene,
-        maps: &Maps<'_>,
-        lookups: Lookups,
-        outlines: Antialiasing,
+        frame: &Frame<'_>,
+        target: TargetFormat,
     ) -> Result<Vec<MaterialBindings>, GpuError> {
-        let (entry, anisotropy) = match lookups.sampling {
+        let Frame { view: SceneView { scene, .. }, maps, lookups } = *frame;
+        let (entry, taps) = match lookups.sampling {
             _ if lookups.neighbours || !maps.method.filterable() => ("neighbours", 1),
             Sampling::Taps(_) => ("filtered", 1),
             Sampling::Sampler(taps) => ("sampled", taps),
         };
         let one = |(material, textures): (&Material, &Textures)| {
-            let lobe = &*material.brdf.lobe;
-            let pipeline = self.pipelines.draw((maps.method, lobe), textures.attributes, entry, outlines)?;
-            let bytes = uniforms::material(material, textures, Some(maps.method), lookups.at_means);
-            let sampler = sampler(self.device, textures.wraps, anisotropy);
-            let (split_sums, blurred) = self
-                .environments
-                .bind_material(scene.environment.as_ref(), || SplitSum::new(&material.brdf))?;
-            let group = self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("material"),
-                layout: &self.pipelines.material,
-                entries: &[
-                    bind(0, self.uniform(&bytes).as_entire_binding()),
-                    bind(1, wgpu::BindingResource::TextureView(&textures.map)),
-                    bind(2, wgpu::BindingResource::TextureView(&textures.params)),
-                    bind(3, wgpu::BindingResource::Sampler(&sampler)),
-                    bind(4, wgpu::BindingResource::TextureView(&split_sums)),
-                    bind(5, wgpu::BindingResource::TextureView(&blurred)),
-                ],
-            });
+            let linked = (&*maps.method, &*material.brdf.lobe);
+            let pipeline = self.pipelines.draw(linked, textures.attributes, entry, target)?;
+            let key = BindKey {
+                renderer: self.number,
+                brdf: material.brdf.clone(),
+                params: material.params,
+                at_means: lookups.at_means,
+                taps,
+                environment: (scene.environment.as_ref())
+                    .map(|e| Surrounding(Arc::clone(&e.filtered), e.technique)),
+            };
+            let mut bound = textures.bound.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some((_, group)) = bound.as_ref().filter(|(last, _)| *last == key) {
+                return Ok(MaterialBindings { pipeline, group: group.clone() });
+            }
+            let group = self.material_group(scene, (material, textures), &maps.method, &key)?;
+            *bound = Some((key, group.clone()));
             Ok(MaterialBindings { pipeline, group })
         };
         scene.materials.iter().zip(&maps.materials).map(one).collect()
+    }
+
+    /// Group 1 of a material.
+    fn material_group(
+        &self,
+        scene: &Scene,
+        (material, textures): (&Material, &Textures),
+        method: &AnyMethod,
+        key: &BindKey,
+    ) -> Result<wgpu::BindGroup, GpuError> {
+        let bytes = uniforms::material(material, textures, Some(&**method), key.at_means);
+        let sampler = self.sampler(SamplerKey { wraps: textures.wraps, taps: key.taps });
+        let (split_sums, blurred) =
+            self.environments.bind_material(scene.environment.as_ref(), || SplitSum::new(&material.brdf))?;
+        Ok(self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("material"),
+            layout: &self.pipelines.material,
+            entries: &[
+                bind(0, self.uniform(&bytes).as_entire_binding()),
+                bind(1, wgpu::BindingResource::TextureView(&textures.map)),
+                bind(2, wgpu::BindingResource::TextureView(&textures.params)),
+                bind(3, wgpu::BindingResource::Sampler(&sampler)),
+                bind(4, wgpu::BindingResource::TextureView(&split_sums)),
+                bind(5, wgpu::BindingResource::TextureView(&blurred)),
+            ],
+        }))
+    }
+
+    /// The sampler of a kind, made once.
+    fn sampler(&self, key: SamplerKey) -> wgpu::Sampler {
+        let mut made = self.samplers.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, sampler)) = made.iter().find(|(of, _)| *of == key) {
+            return sampler.clone();
+        }
+        let sampler = sampler(&self.device, key.wraps, key.taps);
+        made.push((key, sampler.clone()));
+        sampler
+    }
+
+    /// Depths for a target without; made anew when its size changes.
+    fn own_depth(&self, size: Size, samples: u32) -> wgpu::TextureView {
+        let mut last = self.depth.lock().unwrap_or_else(PoisonError::into_inner);
+        let fits = |view: &&wgpu::TextureView| {
+            let texture = view.texture();
+            let held = [texture.width() as usize, texture.height() as usize];
+            held == [size.width, size.height] && texture.sample_count() == samples
+        };
+        if let Some(view) = last.as_ref().filter(fits) {
+            return view.clone();
+        }
+        let format = TargetFormat { format: DEPTH, samples };
+        let view = texture(&self.device, size, format, wgpu::TextureUsages::RENDER_ATTACHMENT);
+        *last = Some(view.clone());
+        view
     }
 
     /// Pipelines and groups of the scene's materials, for the truth.
@@ -288,25 +383,36 @@ impl<'a> Renderer<'a> {
         }))
     }
 
-    /// Draws all triangles on the canvas's target; where the view is masked, only where the canvas's mask says so.
+    /// Draws all triangles.
     pub(crate) fn pass(
         &self,
-        canvas: &Canvas<'_>,
+        encoder: &mut wgpu::CommandEncoder,
         shown: &SceneView<'_>,
         pass: &Pass<'_>,
     ) -> Result<(), GpuError> {
-        let Pass { view, bindings, clock } = *pass;
+        self.pass_masked(encoder, shown, pass, &self.no_mask)
+    }
+
+    /// Draws all triangles; where the view is masked, only where the mask says so.
+    fn pass_masked(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        shown: &SceneView<'_>,
+        pass: &Pass<'_>,
+        mask: &wgpu::TextureView,
+    ) -> Result<(), GpuError> {
+        let Pass { target, view, bindings, clock } = *pass;
         let background = shown.scene.background.as_dvec3();
         let clear = wgpu::Color { r: background.x, g: background.y, b: background.z, a: 1.0 };
-        let target = wgpu::RenderPassColorAttachment {
-            view: &canvas.target,
+        let load = if target.keep.colours { wgpu::LoadOp::Load } else { wgpu::LoadOp::Clear(clear) };
+        let colours = wgpu::RenderPassColorAttachment {
+            view: target.view,
             depth_slice: None,
-            resolve_target: canvas.resolved.as_ref(),
-            ops: wgpu::Operations { load: wgpu::LoadOp::Clear(clear), store: wgpu::StoreOp::Store },
+            resolve_target: target.resolved,
+            ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
         };
-        let group =
-            self.scene_group(shown, view, if view.masked == 1 { &canvas.mask } else { &self.no_mask })?;
-        self.encode(canvas, &[Some(target)], clock, |pass| {
+        let group = self.scene_group(shown, view, mask)?;
+        encode(encoder, &[Some(colours)], &target, clock, |pass| {
             pass.set_bind_group(0, &group, &[]);
             for part in &shown.geometry.parts {
                 let Some(MaterialBindings { pipeline, group }) = bindings.get(part.material) else {
@@ -320,42 +426,14 @@ impl<'a> Renderer<'a> {
         Ok(())
     }
 
-    fn encode(
-        &self,
-        canvas: &Canvas<'_>,
-        targets: &[Option<wgpu::RenderPassColorAttachment<'_>>],
-        clock: Option<&wgpu::QuerySet>,
-        draw: impl FnOnce(&mut wgpu::RenderPass<'_>),
-    ) {
-        let device = &self.device.device;
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: None,
-                color_attachments: targets,
-                depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                    view: &canvas.depth,
-                    depth_ops: Some(wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(0.0),
-                        store: wgpu::StoreOp::Discard,
-                    }),
-                    stencil_ops: None,
-                }),
-                timestamp_writes: clock.map(|query_set| wgpu::RenderPassTimestampWrites {
-                    query_set,
-                    beginning_of_pass_write_index: Some(0),
-                    end_of_pass_write_index: Some(1),
-                }),
-                occlusion_query_set: None,
-                multiview_mask: None,
-            });
-            draw(&mut pass);
-        }
-        self.device.queue.submit([encoder.finish()]);
-    }
-
     /// Marks the canvas's pixels that have an outline in them.
-    fn find_outlines(&self, canvas: &Canvas<'_>, shown: &SceneView<'_>, view: View) -> Result<(), GpuError> {
+    fn find_outlines(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        canvas: &Canvas,
+        shown: &SceneView<'_>,
+        view: View,
+    ) -> Result<(), GpuError> {
         let pipeline = self.pipelines.place()?;
         let group = self.scene_group(shown, view, &self.no_mask)?;
         let target = |view| {
@@ -369,7 +447,8 @@ impl<'a> Renderer<'a> {
                 },
             })
         };
-        self.encode(canvas, &[target(&canvas.places), target(&canvas.faces)], None, |pass| {
+        let targets = [target(&canvas.places), target(&canvas.faces)];
+        encode(encoder, &targets, &canvas.pass_target(), None, |pass| {
             pass.set_pipeline(&pipeline);
             pass.set_bind_group(0, &group, &[]);
             for part in &shown.geometry.parts {
@@ -385,12 +464,18 @@ impl<'a> Renderer<'a> {
                 bind(2, wgpu::BindingResource::TextureView(&canvas.mask)),
             ],
         });
-        self.device.dispatch(&self.outlines, &group, canvas.size.area() as u32);
+        record_dispatch(encoder, &self.outlines, &group, canvas.size.area() as u32);
         Ok(())
     }
 
     /// Adds the picture on the canvas to its sums, of which the first part is kept.
-    pub(crate) fn add(&self, canvas: &Canvas<'_>, (keep, add): (f32, f32), masked: bool) {
+    pub(crate) fn add(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        canvas: &Canvas,
+        Weights { keep, add }: Weights,
+        masked: bool,
+    ) {
         let weights = [keep.to_le_bytes(), add.to_le_bytes(), u32::from(masked).to_le_bytes(), [0; 4]];
         let mask = if masked { &canvas.mask } else { &self.no_mask };
         let group = self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -403,8 +488,64 @@ impl<'a> Renderer<'a> {
                 bind(3, canvas.sums.as_entire_binding()),
             ],
         });
-        self.device.dispatch(&self.accumulate, &group, canvas.size.area() as u32);
+        record_dispatch(encoder, &self.accumulate, &group, canvas.size.area() as u32);
     }
+}
+
+/// Records a pass with depths.
+fn encode(
+    encoder: &mut wgpu::CommandEncoder,
+    targets: &[Option<wgpu::RenderPassColorAttachment<'_>>],
+    target: &PassTarget<'_>,
+    clock: Option<&wgpu::QuerySet>,
+    draw: impl FnOnce(&mut wgpu::RenderPass<'_>),
+) {
+    let Keep { depths, depths_after, .. } = target.keep;
+    let depth_ops = wgpu::Operations {
+        load: if depths { wgpu::LoadOp::Load } else { wgpu::LoadOp::Clear(0.0) },
+        store: if depths_after { wgpu::StoreOp::Store } else { wgpu::StoreOp::Discard },
+    };
+    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: None,
+        color_attachments: targets,
+        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+            view: target.depth,
+            depth_ops: Some(depth_ops),
+            stencil_ops: None,
+        }),
+        timestamp_writes: clock.map(|query_set| wgpu::RenderPassTimestampWrites {
+            query_set,
+            beginning_of_pass_write_index: Some(0),
+            end_of_pass_write_index: Some(1),
+        }),
+        occlusion_query_set: None,
+        multiview_mask: None,
+    });
+    draw(&mut pass);
+}
+
+/// A texture of one level and layer, as it is bound.
+fn texture(
+    device: &Device,
+    size: Size,
+    TargetFormat { format, samples }: TargetFormat,
+    usage: wgpu::TextureUsages,
+) -> wgpu::TextureView {
+    let texture = device.device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d {
+            width: size.width as u32,
+            height: size.height as u32,
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: 1,
+        sample_count: samples,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage,
+        view_formats: &[],
+    });
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
 fn bind(binding: u32, resource: wgpu::BindingResource<'_>) -> wgpu::BindGroupEntry<'_> {

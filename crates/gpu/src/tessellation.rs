@@ -56,7 +56,7 @@ enum Base {
 
 /// The meshes of a scene in the GPU's memory, to be cut for any picture.
 pub struct Meshes<'a> {
-    device: &'a Device,
+    device: Device,
     scene: &'a Scene,
     bases: Vec<Base>,
     points: wgpu::ComputePipeline,
@@ -70,7 +70,7 @@ impl<'a> Meshes<'a> {
     ///
     /// # Errors
     /// [`GpuError`] for a scene larger than the device's buffers.
-    pub fn new(device: &'a Device, scene: &'a Scene) -> Result<Self, GpuError> {
+    pub fn new(device: &Device, scene: &'a Scene) -> Result<Self, GpuError> {
         let (middle, radius) = scene.bounds();
         let base = |(number, object): (usize, &Object)| {
             let vertices: Vec<Corner> =
@@ -81,7 +81,7 @@ impl<'a> Meshes<'a> {
                     object.mesh.triangles.iter().map(|t| triangle(&object.mesh, t, number)).collect();
                 return Ok(Base::Plain { vertices, corners: corners().to_vec(), triangles });
             };
-            let upload = |what: &'static str, bytes: &[u8]| {
+            let upload = |what: &'static str, bytes: &[u8]| -> Result<wgpu::Buffer, GpuError> {
                 device.check_bytes(what, bytes.len() as u64)?;
                 Ok(device.upload(bytes, wgpu::BufferUsages::STORAGE))
             };
@@ -92,7 +92,7 @@ impl<'a> Meshes<'a> {
             })
         };
         Ok(Self {
-            device,
+            device: device.clone(),
             scene,
             bases: scene.objects.iter().enumerate().map(base).collect::<Result<_, GpuError>>()?,
             points: device.compute_pipeline(&[TWIN, HEIGHTS, include_str!("passes/points.wgsl")].join("\n")),
@@ -124,7 +124,7 @@ impl<'a> Meshes<'a> {
         let total = (0..plans.len()).map(counts).fold((0_u64, 0_u64), |(p, t), (points, triangles)| {
             (p + u64::from(points), t + u64::from(triangles))
         });
-        let geometry = Geometry::empty(self.device, total, (self.middle, self.radius))?;
+        let geometry = Geometry::empty(&self.device, total, (self.middle, self.radius))?;
         let (mut parts, mut first) = (Vec::new(), (0, 0));
         for (i, object) in self.scene.objects.iter().enumerate() {
             let (points, triangles) = counts(i);
@@ -140,7 +140,7 @@ impl<'a> Meshes<'a> {
                 }
                 (_, Base::Plain { vertices, corners, triangles }) => {
                     let corners: Vec<u32> = corners.iter().map(|c| c + first.0).collect();
-                    geometry.fill(self.device, (vertices, &corners, triangles), first);
+                    geometry.fill(&self.device, (vertices, &corners, triangles), first);
                 }
                 (None, Base::Displacement { .. }) => {}
             }

@@ -5,12 +5,13 @@
 
 use glam::{DVec2, DVec3};
 use ndfmap_core::grid::Grid;
-use ndfmap_core::metrics::{Picture, relative_l2};
-use ndfmap_core::scene::{Camera, Material};
+use ndfmap_core::metrics::relative_l2;
+use ndfmap_core::observe::Observer;
+use ndfmap_core::scene::{Camera, Effort, Material, TruePicture};
 
 use crate::canvas::{Antialiasing, Canvas};
 use crate::maps::Textures;
-use crate::renderer::{Pass, Renderer, SceneView};
+use crate::renderer::{Pass, Renderer, SceneView, Weights};
 use crate::uniforms::View;
 use crate::{Device, GpuError};
 
@@ -36,44 +37,34 @@ impl FinestMaps {
     }
 }
 
-/// When a truth is good enough.
-pub struct Effort<'a> {
-    /// Samples a pixel, rounded up to a multiple of [`LEAST_SAMPLES`].
-    pub samples: usize,
-    /// Stop once the noise is below this, too; 0 never does.
-    pub noise: f64,
-    /// Told the fraction done.
-    pub progress: &'a (dyn Fn(f64) + Sync),
+/// A frame to be drawn by brute force: a scene, and its maps as they are.
+#[derive(Clone, Copy)]
+pub struct TrueFrame<'a> {
+    /// The scene.
+    pub view: SceneView<'a>,
+    /// The finest level of its maps, uploaded to the renderer's device.
+    pub finest: &'a FinestMaps,
 }
 
-/// A picture by brute force.
-pub struct TruePicture {
-    /// Linear RGB.
-    pub picture: Picture,
-    /// Samples a pixel.
-    pub samples: usize,
-    /// Relative L2 error that the picture has for want of samples, from the difference of its two halves.
-    pub noise: f64,
-}
-
-impl Renderer<'_> {
-    /// Renders the truth.
+impl Renderer {
+    /// Renders the truth; rays are rounded up to a multiple of [`LEAST_SAMPLES`], and seeds make no difference.
     ///
     /// # Errors
-    /// [`GpuError`].
+    /// [`GpuError`], and where the observer wants no more.
     ///
     /// # Panics
     /// When the canvas smooths outlines by itself: the truth does that with its samples.
     pub fn truth(
         &self,
-        canvas: &Canvas<'_>,
-        shown: &SceneView<'_>,
-        finest: &FinestMaps,
-        effort: &Effort<'_>,
+        canvas: &Canvas,
+        frame: &TrueFrame<'_>,
+        effort: &Effort,
+        observer: &dyn Observer,
     ) -> Result<TruePicture, GpuError> {
+        let TrueFrame { view: shown, finest } = frame;
         assert_eq!(canvas.outlines, Antialiasing::Sharp, "the truth smooths outlines by itself");
         let bindings = self.bind_finest(shown.scene, &finest.materials)?;
-        let rounds = effort.samples.div_ceil(LEAST_SAMPLES).max(1);
+        let rounds = effort.rays.div_ceil(LEAST_SAMPLES).max(1);
         let mut halves = [vec![DVec3::ZERO; canvas.size.area()], vec![DVec3::ZERO; canvas.size.area()]];
         let mut done = 0;
         loop {
@@ -83,17 +74,23 @@ impl Renderer<'_> {
             let more = wanted.min(rounds - done).min(MOST_ROUNDS);
             for (half, sums) in halves.iter_mut().enumerate() {
                 for round in done..done + more {
+                    observer.check()?;
+                    let mut encoder = canvas.device.encoder();
                     for stratum in 0..STRATA * STRATA {
                         let number = (2 * round + half) * STRATA * STRATA + stratum;
                         let view = jittered(shown, canvas, stratum, number as u32);
-                        self.pass(canvas, shown, &Pass { view, bindings: &bindings, clock: None })?;
+                        let pass =
+                            Pass { target: canvas.pass_target(), view, bindings: &bindings, clock: None };
+                        self.pass(&mut encoder, shown, &pass)?;
                         let first = round == done && stratum == 0;
-                        self.add(canvas, (if first { 0.0 } else { 1.0 }, 1.0), false);
+                        let weights = Weights { keep: if first { 0.0 } else { 1.0 }, add: 1.0 };
+                        self.add(&mut encoder, canvas, weights, false);
                     }
+                    canvas.device.submit(encoder);
                     // A queue without end would be memory without end.
                     canvas.device.wait()?;
                     let part = (half * more + round + 1 - done) as f64 / 2.0;
-                    (effort.progress)((done as f64 + part) / rounds as f64);
+                    observer.progress((done as f64 + part) / rounds as f64);
                 }
                 for (sum, colour) in sums.iter_mut().zip(canvas.read()?.texels()) {
                     *sum += colour.as_dvec3();
@@ -107,9 +104,9 @@ impl Renderer<'_> {
             });
             let noise = relative_l2(&a, &b) / 2.0;
             if done == rounds || noise <= effort.noise {
-                (effort.progress)(1.0);
+                observer.progress(1.0);
                 let picture = Grid::from_fn(canvas.size, |x, y| 0.5 * (a.row(y)[x] + b.row(y)[x]));
-                return Ok(TruePicture { picture, samples: done * LEAST_SAMPLES, noise });
+                return Ok(TruePicture { picture, rays: done * LEAST_SAMPLES, noise });
             }
         }
     }
@@ -119,7 +116,7 @@ impl Renderer<'_> {
 const MOST_ROUNDS: usize = 64;
 
 /// What is seen through a stratum of every pixel, somewhere in it.
-fn jittered(shown: &SceneView<'_>, canvas: &Canvas<'_>, stratum: usize, number: u32) -> View {
+fn jittered(shown: &SceneView<'_>, canvas: &Canvas, stratum: usize, number: u32) -> View {
     let [u, v] = [0, 1].map(|axis| f64::from(scramble(number.wrapping_mul(2) + axis)) / f64::from(u32::MAX));
     let corner = DVec2::new((stratum % STRATA) as f64, (stratum / STRATA) as f64);
     let offset = (corner + DVec2::new(u, v)) / STRATA as f64 - 0.5;

@@ -4,15 +4,13 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Mat4, Vec3, Vec4};
 use ndfmap_core::grid::Size;
 use ndfmap_core::light::Light;
-use ndfmap_core::lookup::Filtering;
+use ndfmap_core::lookup::{Filtering, Sampling};
 use ndfmap_core::ndf::Method;
 use ndfmap_core::scene::{Camera, Material};
 use ndfmap_core::surface::Wrap;
 
-use crate::canvas::Canvas;
 use crate::geometry::Geometry;
 use crate::maps::Textures;
-use crate::renderer::Sampling;
 use ndfmap_core::shader::LobeTable;
 
 /// `View` in `scene.wgsl`.
@@ -66,9 +64,9 @@ impl View {
         }
     }
 
-    /// The same on a canvas, with a filter.
-    pub(crate) fn on(self, canvas: &Canvas<'_>, sampling: Sampling) -> Self {
-        let half = canvas.outlines.format() == wgpu::TextureFormat::Rgba16Float;
+    /// The same on a target of this format, with a filter.
+    pub(crate) fn on(self, format: wgpu::TextureFormat, sampling: Sampling) -> Self {
+        let half = format == wgpu::TextureFormat::Rgba16Float;
         let brightest = if half { half::f16::MAX.to_f32() } else { f32::MAX };
         let view = Self { brightest, ..self };
         let Sampling::Taps(Filtering { max_taps, parts, lod_bias }) = sampling else { return view };

@@ -16,7 +16,6 @@ use ndfmap_core::brdf::{AnyLobe, Brdf, Directions, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::Size;
 use ndfmap_core::lookup::Lookup;
 use ndfmap_core::ndf::{self, AnyMethod, FilteredTexel, IncidentLight, Method};
-use ndfmap_core::pyramid::Precision;
 use ndfmap_core::units::SlopeVariance;
 use ndfmap_core::{brdf, procedural, shader};
 use ndfmap_gpu::Device;
@@ -60,8 +59,7 @@ fn probes(method: &dyn Method, count: usize) -> Vec<Probe> {
     let mut random = Pcg64Mcg::seed_from_u64(7);
     let size = Size { width: 64, height: 64 };
     let surface = (procedural::find("foil").unwrap().build)(size);
-    let (pyramid, _) =
-        Bake { surface: &*surface, method, precision: Precision::Half, progress: &|_| () }.to_pyramid();
+    let (pyramid, _) = Bake::new(&*surface, method).to_pyramid().unwrap();
     let map = Lookup::new(&pyramid);
     let texel = |random: &mut Pcg64Mcg| {
         let level = random.random_range(0..pyramid.sizes().len());

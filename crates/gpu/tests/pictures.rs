@@ -8,17 +8,18 @@ use common::device;
 use ndfmap_core::brdf::AnyLobe;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::environment::{SceneEnvironment, Technique, builtin};
-use ndfmap_core::lookup::Filtering;
+use ndfmap_core::lookup::{Filtering, Lookups, Sampling};
 use ndfmap_core::metrics::{Picture, display, relative_l2};
 use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::observe::Unobserved;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{self, Scene, SceneOptions, SurfaceTextures};
+use ndfmap_core::scene::{self, Effort, Scene, SceneOptions, SurfaceTextures};
 use ndfmap_core::{brdf, ndf};
 use ndfmap_gpu::{
-    Antialiasing, Canvas, FinestMaps, Geometry, Lookups, Maps, Meshes, Renderer, Sampling, SceneView,
+    Antialiasing, Canvas, FinestMaps, Frame, Geometry, Maps, Meshes, Renderer, SceneView, TrueFrame,
 };
-use ndfmap_trace::filtered::{self, BakedMaps, Filtered};
-use ndfmap_trace::truth::{Effort, Truth};
+use ndfmap_trace::filtered::{BakedMaps, Filtered};
+use ndfmap_trace::truth::Truth;
 
 /// A display value may be off by one step of a byte.
 const STEP: f32 = 1.0 / 255.0;
@@ -53,20 +54,19 @@ fn every_method_draws_what_the_cpu_draws() {
     for spelling in methods {
         let method = spelling.parse::<AnyMethod>().unwrap();
         for (name, scene) in &scenes {
-            let ours = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
-            let theirs = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
+            let ours = Maps::new(&device, &scene.materials, &method, Precision::Half, &|_| ()).unwrap();
+            let theirs = BakedMaps::new(&scene.materials, &method, Precision::Half, &|_| ()).unwrap();
             let on_cpu = ndfmap_trace::Geometry::new(scene);
             let on_gpu = Geometry::new(&device, scene).unwrap();
             let shown = SceneView { scene, geometry: &on_gpu, camera: &scene.camera };
-            let traced = Filtered { scene, geometry: &on_cpu, maps: &theirs, progress: &|_| () };
+            let traced = Filtered { scene, geometry: &on_cpu, maps: &theirs };
             for (filtering, neighbours) in
                 [(Filtering::TRILINEAR, false), (Filtering::anisotropic(8), spelling.contains("unaligned"))]
             {
                 let lookups = Lookups { sampling: Sampling::Taps(filtering), neighbours, at_means: false };
-                renderer.draw(&canvas, &shown, &ours, lookups).unwrap();
+                renderer.draw(&canvas, &Frame { view: shown, maps: &ours, lookups }).unwrap();
                 let drawn = canvas.read().unwrap();
-                let lookups = filtered::Lookups { filtering, neighbours, at_means: false };
-                let traced = traced.render(&scene.camera, size, lookups);
+                let traced = traced.render(&scene.camera, size, lookups, &Unobserved).unwrap();
                 let share = off(&drawn, &traced, scene.exposure);
                 eprintln!("{spelling} {name} {} taps: {share:.5} off", filtering.max_taps);
                 if share > MAY_DIFFER {
@@ -91,16 +91,12 @@ fn the_truth_is_the_truth() {
         let shown = SceneView { scene: &scene, geometry: &on_gpu, camera: &scene.camera };
         let finest = FinestMaps::new(&device, &scene.materials).unwrap();
         let ours = renderer
-            .truth(
-                &sharp,
-                &shown,
-                &finest,
-                &ndfmap_gpu::Effort { samples: 512, noise: 0.0, progress: &|_| () },
-            )
+            .truth(&sharp, &TrueFrame { view: shown, finest: &finest }, &Effort::rays(512), &Unobserved)
             .unwrap();
         let on_cpu = ndfmap_trace::Geometry::new(&scene);
         let truth = Truth::new(&scene, &on_cpu);
-        let theirs = truth.render(&scene.camera, size, &Effort { rays: 512, noise: 0.0, seed: 3 }, &|_| ());
+        let effort = Effort { seed: 3, ..Effort::rays(512) };
+        let theirs = truth.render(&scene.camera, size, &effort, &Unobserved).unwrap();
         let apart = relative_l2(&ours.picture, &theirs.picture);
         let expected = ours.noise.hypot(theirs.noise);
         // The noise of both is itself known to a tenth or so, from one difference of halves over 12 000 pixels of uneven weight.
@@ -111,16 +107,15 @@ fn the_truth_is_the_truth() {
         let ratio = f64::from(mean(&ours.picture) / mean(&theirs.picture));
         assert!((ratio - 1.0).abs() < 5.0 * expected / 100.0, "{name}: means are {ratio} apart");
         // Errors of a method are the same on both devices, to the noise of either truth.
-        let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
+        let maps = Maps::new(&device, &scene.materials, &method, Precision::Half, &|_| ()).unwrap();
         let taps = Sampling::Taps(Filtering::fine(16));
         let lookups = Lookups { sampling: taps, neighbours: false, at_means: false };
-        renderer.draw(&parts, &shown, &maps, lookups).unwrap();
+        renderer.draw(&parts, &Frame { view: shown, maps: &maps, lookups }).unwrap();
         let drawn = relative_l2(&parts.read().unwrap(), &ours.picture);
-        let maps = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
-        let traced = Filtered { scene: &scene, geometry: &on_cpu, maps: &maps, progress: &|_| () };
-        let lookups =
-            filtered::Lookups { filtering: Filtering::fine(16), neighbours: false, at_means: false };
-        let traced = relative_l2(&traced.render(&scene.camera, size, lookups), &theirs.picture);
+        let maps = BakedMaps::new(&scene.materials, &method, Precision::Half, &|_| ()).unwrap();
+        let traced = Filtered { scene: &scene, geometry: &on_cpu, maps: &maps };
+        let traced =
+            relative_l2(&traced.render(&scene.camera, size, lookups, &Unobserved).unwrap(), &theirs.picture);
         eprintln!(
             "{name}: apart {apart:.4}, noise {expected:.4}; vmf:4 is off by {drawn:.4} and {traced:.4}"
         );
@@ -135,12 +130,17 @@ fn the_sampler_is_near_our_taps() {
     let (renderer, size) = (Renderer::new(&device).unwrap(), Size { width: 200, height: 200 });
     let scene = staged("disk", 0.3, 256);
     let method = "vmf:4".parse::<AnyMethod>().unwrap();
-    let maps = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
+    let maps = Maps::new(&device, &scene.materials, &method, Precision::Half, &|_| ()).unwrap();
     let geometry = Geometry::new(&device, &scene).unwrap();
     let shown = SceneView { scene: &scene, geometry: &geometry, camera: &scene.camera };
     let canvas = Canvas::new(&device, size, Antialiasing::Multisampled).unwrap();
     let draw = |sampling| {
-        renderer.draw(&canvas, &shown, &maps, Lookups { sampling, ..Lookups::TRILINEAR }).unwrap();
+        renderer
+            .draw(
+                &canvas,
+                &Frame { view: shown, maps: &maps, lookups: Lookups { sampling, ..Lookups::TRILINEAR } },
+            )
+            .unwrap();
         canvas.read().unwrap()
     };
     let ours = draw(Sampling::Taps(Filtering::TRILINEAR));
@@ -174,14 +174,13 @@ fn colours_and_gloss_of_maps_are_drawn_too() {
     for spelling in ["vmf:2", "gmm:3", "slopes", "toksvig", "ndm", "ndm:gaussian", "phong:1", "sh:4", "sh:7"]
     {
         let method = spelling.parse::<AnyMethod>().unwrap();
-        let ours = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
+        let ours = Maps::new(&device, &scene.materials, &method, Precision::Half, &|_| ()).unwrap();
         let lookups = Lookups { sampling: Sampling::Taps(filtering), neighbours: false, at_means: false };
-        renderer.draw(&canvas, &shown, &ours, lookups).unwrap();
+        renderer.draw(&canvas, &Frame { view: shown, maps: &ours, lookups }).unwrap();
         let drawn = canvas.read().unwrap();
-        let theirs = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
-        let traced = Filtered { scene: &scene, geometry: &on_cpu, maps: &theirs, progress: &|_| () };
-        let lookups = filtered::Lookups { filtering, neighbours: false, at_means: false };
-        let traced = traced.render(&scene.camera, size, lookups);
+        let theirs = BakedMaps::new(&scene.materials, &method, Precision::Half, &|_| ()).unwrap();
+        let traced = Filtered { scene: &scene, geometry: &on_cpu, maps: &theirs };
+        let traced = traced.render(&scene.camera, size, lookups, &Unobserved).unwrap();
         let (share, apart) = (off(&drawn, &traced, scene.exposure), relative_l2(&drawn, &traced));
         eprintln!("{spelling}: {share:.5} off, {apart:.5} apart");
         assert!(share <= MAY_DIFFER, "{spelling}: {share} off, {apart} apart");
@@ -204,17 +203,15 @@ fn displaced_scenes_are_the_cpus() {
         let shown = SceneView { scene: &scene, geometry: &on_gpu, camera: &scene.camera };
         for spelling in ["slopes", "vmf:4"] {
             let method = spelling.parse::<AnyMethod>().unwrap();
-            let ours = Maps::new(&device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
-            let theirs = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
-            let traced = Filtered { scene: &scene, geometry: &on_cpu, maps: &theirs, progress: &|_| () };
+            let ours = Maps::new(&device, &scene.materials, &method, Precision::Half, &|_| ()).unwrap();
+            let theirs = BakedMaps::new(&scene.materials, &method, Precision::Half, &|_| ()).unwrap();
+            let traced = Filtered { scene: &scene, geometry: &on_cpu, maps: &theirs };
             let filtering = Filtering::TRILINEAR;
             let sampling = Sampling::Taps(filtering);
-            renderer
-                .draw(&canvas, &shown, &ours, Lookups { sampling, neighbours: false, at_means: false })
-                .unwrap();
+            let lookups = Lookups { sampling, neighbours: false, at_means: false };
+            renderer.draw(&canvas, &Frame { view: shown, maps: &ours, lookups }).unwrap();
             let drawn = canvas.read().unwrap();
-            let lookups = filtered::Lookups { filtering, neighbours: false, at_means: false };
-            let traced = traced.render(&scene.camera, size, lookups);
+            let traced = traced.render(&scene.camera, size, lookups, &Unobserved).unwrap();
             let share = off(&drawn, &traced, scene.exposure);
             eprintln!("{name} displaced, {spelling}: {share:.5} off, {} triangles", on_gpu.len());
             // Triangles are of a few pixels, and so edges are many.
@@ -227,17 +224,20 @@ fn displaced_scenes_are_the_cpus() {
 fn off_by(device: &ndfmap_gpu::Device, scene: &Scene, spelling: &str, size: Size) -> f64 {
     let (renderer, method) = (Renderer::new(device).unwrap(), spelling.parse::<AnyMethod>().unwrap());
     let canvas = Canvas::new(device, size, Antialiasing::Parts).unwrap();
-    let ours = Maps::new(device, &scene.materials, &*method, Precision::Half, &|_| ()).unwrap();
-    let theirs = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
+    let ours = Maps::new(device, &scene.materials, &method, Precision::Half, &|_| ()).unwrap();
+    let theirs = BakedMaps::new(&scene.materials, &method, Precision::Half, &|_| ()).unwrap();
     let on_cpu = ndfmap_trace::Geometry::displaced(scene, &scene.camera, size);
     let on_gpu = Meshes::new(device, scene).unwrap().cut(&scene.camera, size).unwrap();
     let shown = SceneView { scene, geometry: &on_gpu, camera: &scene.camera };
-    let traced = Filtered { scene, geometry: &on_cpu, maps: &theirs, progress: &|_| () };
+    let traced = Filtered { scene, geometry: &on_cpu, maps: &theirs };
     let filtering = Filtering::anisotropic(4);
     let lookups = Lookups { sampling: Sampling::Taps(filtering), neighbours: false, at_means: false };
-    renderer.draw(&canvas, &shown, &ours, lookups).unwrap();
-    let lookups = filtered::Lookups { filtering, neighbours: false, at_means: false };
-    off(&canvas.read().unwrap(), &traced.render(&scene.camera, size, lookups), scene.exposure)
+    renderer.draw(&canvas, &Frame { view: shown, maps: &ours, lookups }).unwrap();
+    off(
+        &canvas.read().unwrap(),
+        &traced.render(&scene.camera, size, lookups, &Unobserved).unwrap(),
+        scene.exposure,
+    )
 }
 
 /// Lit by a built-in environment alone, turned, at an exposure that shows it.

@@ -46,8 +46,7 @@ fn ktx2() -> Vec<u8> {
     };
     let map = read_source("builtin:armour".as_ref(), &options).unwrap();
     let method = "slopes".parse::<AnyMethod>().unwrap();
-    let bake =
-        Bake { surface: &*map.surface, method: &*method, precision: Precision::Half, progress: &|_| () };
+    let bake = Bake::new(&*map.surface, &*method);
     let header = baked("slopes", "armour", Precision::Half).header;
     let mut sink = Ktx2Sink::create(&path, &header, bake.layout()).unwrap();
     bake.run(&mut sink).unwrap();

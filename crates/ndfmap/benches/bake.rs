@@ -53,10 +53,10 @@ fn error(spelling: &str) -> Result<f64, Box<dyn std::error::Error>> {
     let lobe = "blinn-phong:50".parse::<AnyLobe>()?;
     let lattice = lattice_for(&*lobe);
     let truth = TexelTruth::new(&*surface, &*lobe, &lattice);
-    let level = true_levels(&truth, &|_| ()).swap_remove(4);
+    let level = true_levels(&truth, &|_| ())?.swap_remove(4);
     let method = spelling.parse::<AnyMethod>()?;
-    let bake = Bake { surface: &*surface, method: &*method, precision: Precision::Half, progress: &|_| () };
-    Ok(level_error(&bake.to_pyramid().0, &*method, &*lobe, &lattice, &level))
+    let bake = Bake::new(&*surface, &*method);
+    Ok(level_error(&bake.to_pyramid()?.0, &*method, &*lobe, &lattice, &level))
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -80,7 +80,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for spelling in METHODS {
         let method = spelling.parse::<AnyMethod>()?;
         let surface: &dyn Surface = &*map.surface;
-        let bake = Bake { surface, method: &*method, precision: Precision::Half, progress: &|_| () };
+        let bake = Bake::new(surface, &*method);
         let layout =
             Layout { size, layers: method.layers(), precision: Precision::Half, wraps: Wraps::default() };
         if layout.layers * size.area() > 1 << 28 {

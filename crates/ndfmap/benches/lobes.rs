@@ -7,12 +7,11 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use ndfmap_core::bake::{Bake, MemorySink};
+use ndfmap_core::bake::{Bake, BakeError, MemorySink};
 use ndfmap_core::brdf::AnyLobe;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::measure::{FilteringError, TexelTruth, filtering_error, lattice_for, true_corners};
 use ndfmap_core::ndf::AnyMethod;
-use ndfmap_core::pyramid::Precision;
 use ndfmap_core::surface::{NormalGrid, Surface, SurfaceRow};
 use ndfmap_maps::source::{SourceOptions, read_source};
 
@@ -95,11 +94,10 @@ fn time(largest: usize, turns: usize) -> Result<(), Box<dyn std::error::Error>> 
                 continue;
             }
             let method = spelling.parse::<AnyMethod>()?;
-            let bake =
-                Bake { surface: &surface, method: &*method, precision: Precision::Half, progress: &|_| () };
+            let bake = Bake::new(&surface, &*method);
             let mut sink = MemorySink::new(bake.layout());
             bake.run(&mut sink)?;
-            let mut turn = || -> Result<f64, std::convert::Infallible> {
+            let mut turn = || -> Result<f64, BakeError<std::convert::Infallible>> {
                 let start = Instant::now();
                 bake.run(&mut sink)?;
                 Ok(start.elapsed().as_secs_f64())
@@ -122,15 +120,14 @@ fn measure(map: &Path) -> Result<Vec<Vec<Vec<FilteringError>>>, Box<dyn std::err
         let lobe = lobe.parse::<AnyLobe>()?;
         let lattice = lattice_for(&*lobe);
         let corners =
-            true_corners(&TexelTruth::new(&surface, &*lobe, &lattice), surface.wraps(), &LEVELS, &|_| ());
+            true_corners(&TexelTruth::new(&surface, &*lobe, &lattice), surface.wraps(), &LEVELS, &|_| ())?;
         truths.push((lobe, lattice, corners));
     }
     let mut all = Vec::new();
     for spelling in METHODS {
         let method = spelling.parse::<AnyMethod>()?;
-        let bake =
-            Bake { surface: &surface, method: &*method, precision: Precision::Half, progress: &|_| () };
-        let (pyramid, _) = bake.to_pyramid();
+        let bake = Bake::new(&surface, &*method);
+        let (pyramid, _) = bake.to_pyramid()?;
         let errors = truths.iter().map(|(lobe, lattice, corners)| {
             corners.iter().map(|c| filtering_error(&pyramid, &*method, &**lobe, lattice, c)).collect()
         });

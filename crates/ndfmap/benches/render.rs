@@ -7,14 +7,15 @@
 use std::time::Instant;
 
 use ndfmap_core::grid::Size;
-use ndfmap_core::lookup::Filtering;
+use ndfmap_core::lookup::{Filtering, Lookups};
 use ndfmap_core::metrics::{color_error, relative_l2};
 use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::observe::Unobserved;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{self, Scene, SceneOptions};
+use ndfmap_core::scene::{self, Effort, Scene, SceneOptions};
 use ndfmap_trace::Geometry;
-use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
-use ndfmap_trace::truth::{Effort, Truth};
+use ndfmap_trace::filtered::{BakedMaps, Filtered};
+use ndfmap_trace::truth::Truth;
 
 const METHODS: &[&str] = &["naive", "toksvig", "slopes", "sh:4", "gmm:4", "vmf:4", "vmf:6", "phong:4"];
 
@@ -58,9 +59,10 @@ fn costs(name: &str, time: f64, side: usize, runs: usize) -> Result<(), Box<dyn 
     let scene = scene(name, time, 512)?;
     let (geometry, size) = (Geometry::new(&scene), square(side));
     let truth = Truth::new(&scene, &geometry);
-    let brute = |rays, seed| truth.render(&scene.camera, size, &Effort { rays, noise: 0.0, seed }, &|_| ());
+    let brute =
+        |rays, seed| truth.render(&scene.camera, size, &Effort { rays, noise: 0.0, seed }, &Unobserved);
     let seconds = median(runs, || drop(brute(TIMED, 0))) * (STATED / TIMED) as f64;
-    let best = brute(STATED, 1);
+    let best = brute(STATED, 1)?;
     println!(
         "\n{name} at time {time}, {side} x {side}: truth of {STATED} rays {seconds:.2} s, noise {:.3}",
         best.noise
@@ -71,13 +73,13 @@ fn costs(name: &str, time: f64, side: usize, runs: usize) -> Result<(), Box<dyn 
     );
     for spelling in METHODS {
         let method = spelling.parse::<AnyMethod>()?;
-        let maps = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
-        let filtered = Filtered { scene: &scene, geometry: &geometry, maps: &maps, progress: &|_| () };
+        let maps = BakedMaps::new(&scene.materials, &method, Precision::Half, &|_| ())?;
+        let filtered = Filtered { scene: &scene, geometry: &geometry, maps: &maps };
         for (filter, filtering) in FILTERS {
-            let lookups = Lookups { filtering: *filtering, ..Lookups::TRILINEAR };
-            let render = || filtered.render(&scene.camera, size, lookups);
+            let lookups = Lookups::taps(*filtering);
+            let render = || filtered.render(&scene.camera, size, lookups, &Unobserved);
             let own = median(runs, || drop(render()));
-            let picture = render();
+            let picture = render()?;
             println!(
                 "{spelling:8} {filter:14} {:>9.1} {:>12.0} {:>12.4} {:>12.3}",
                 own * 1e3,
@@ -96,11 +98,12 @@ fn scaling(side: usize, runs: usize) -> Result<(), Box<dyn std::error::Error>> {
     for map in [256, 512, 1024] {
         let scene = scene("plane", 0.0, map)?;
         let geometry = Geometry::new(&scene);
-        let maps = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
-        let filtered = Filtered { scene: &scene, geometry: &geometry, maps: &maps, progress: &|_| () };
+        let maps = BakedMaps::new(&scene.materials, &method, Precision::Half, &|_| ())?;
+        let filtered = Filtered { scene: &scene, geometry: &geometry, maps: &maps };
         for side in [side / 2, side, 2 * side] {
-            let lookups = Lookups { filtering: Filtering::fine(16), ..Lookups::TRILINEAR };
-            let own = median(runs, || drop(filtered.render(&scene.camera, square(side), lookups)));
+            let lookups = Lookups::taps(Filtering::fine(16));
+            let render = || filtered.render(&scene.camera, square(side), lookups, &Unobserved);
+            let own = median(runs, || drop(render()));
             println!(
                 "map {map:>5}, picture {side:>5}: {:>8.1} ms {:>8.0} ns",
                 own * 1e3,

@@ -13,15 +13,16 @@ use glam::DVec3;
 use ndfmap::core::brdf::{AnyLobe, Lambert};
 use ndfmap::core::grid::{Grid, Size};
 use ndfmap::core::light::environment::{SceneEnvironment, builtin};
+use ndfmap::core::lookup::{Filtering, Lookups};
 use ndfmap::core::metrics::{Picture, relative_l2};
+use ndfmap::core::observe::Unobserved;
 use ndfmap::core::pyramid::Precision;
-use ndfmap::core::scene::{self, Scene, SceneOptions};
+use ndfmap::core::scene::{self, Effort, Scene, SceneOptions};
 use ndfmap::maps::picture::write_picture;
-use ndfmap::trace::filtered::{BakedMaps, Filtered, Lookups};
-use ndfmap::trace::truth::{Effort, Truth};
+use ndfmap::trace::filtered::{BakedMaps, Filtered};
+use ndfmap::trace::truth::Truth;
 use ndfmap::trace::{DisplacedMeshes, Geometry};
 
-use ndfmap::core::lookup::Filtering;
 use ndfmap_core::ndf::AnyMethod;
 
 /// What the spheres are made of, and what lights them.
@@ -113,19 +114,19 @@ fn pictures(
     let rays = if scene.environment.is_some() { 4 * RAYS * small } else { RAYS };
     let effort = Effort { rays, noise: 0.0, seed: 0 };
     let flat = Geometry::new(scene);
-    let normal_map = Truth::new(scene, &flat).render(&scene.camera, plan.size, &effort, &|_| ()).picture;
+    let normal_map = Truth::new(scene, &flat).render(&scene.camera, plan.size, &effort, &|_| ())?.picture;
     let (plain, displacement) = (Geometry::without_displacement(scene), DisplacedMeshes::new(scene));
     let truth =
-        Truth::displaced(scene, &plain, &displacement).render(&scene.camera, plan.size, &effort, &|_| ());
+        Truth::displaced(scene, &plain, &displacement).render(&scene.camera, plan.size, &effort, &|_| ())?;
     println!("truth: {rays} rays a pixel, noise {:.4}", truth.noise);
     let mut all = vec![normal_map, truth.picture];
     let geometry = Geometry::displaced(scene, &scene.camera, plan.size);
     for spelling in methods {
         let method = spelling.parse::<AnyMethod>()?;
-        let maps = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
-        let filtered = Filtered { scene, geometry: &geometry, maps: &maps, progress: &|_| () };
-        let lookups = Lookups { filtering: Filtering::fine(16), ..Lookups::TRILINEAR };
-        all.push(filtered.render(&scene.camera, plan.size, lookups));
+        let maps = BakedMaps::new(&scene.materials, &method, Precision::Half, &|_| ())?;
+        let filtered = Filtered { scene, geometry: &geometry, maps: &maps };
+        let lookups = Lookups::taps(Filtering::fine(16));
+        all.push(filtered.render(&scene.camera, plan.size, lookups, &Unobserved)?);
     }
     Ok(all)
 }

@@ -8,7 +8,6 @@ use ndfmap::core::bake::Bake;
 use ndfmap::core::brdf::AnyLobe;
 use ndfmap::core::grid::Size;
 use ndfmap::core::measure::TexelTruth;
-use ndfmap::core::pyramid::Precision;
 use ndfmap::core::sphere::DiskLattice;
 use ndfmap::core::surface::{SlopeFilter, Wraps};
 use ndfmap::maps::source::{Convention, DEFAULT_HEIGHT_SCALE, SourceOptions, read_source};
@@ -53,13 +52,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let methods = methods.into_iter().collect::<Result<Vec<_>, _>>()?;
     let mut pyramids = Vec::new();
     for method in &methods {
-        let bake = Bake {
-            surface: &*source.surface,
-            method: &**method,
-            precision: Precision::Half,
-            progress: &|_| (),
-        };
-        pyramids.push(bake.to_pyramid().0);
+        let bake = Bake::new(&*source.surface, &**method);
+        pyramids.push(bake.to_pyramid()?.0);
     }
     println!("level {LEVEL} of {}; errors are relative L2 over half-vectors, of f alone", map.display());
     println!(

@@ -85,25 +85,20 @@ impl Auto<'_> {
         let corners = {
             let progress = Progress::new("truth");
             let truth = TexelTruth::new(self.surface, self.lobe, &lattice);
-            true_corners(&truth, self.surface.wraps(), &levels, &|f| progress.set(f))
+            true_corners(&truth, self.surface.wraps(), &levels, &progress)?
         };
         let mut candidates = Vec::new();
         for spelling in CANDIDATES {
             let method = spelling.parse::<AnyMethod>().map_err(|e| Failure::Failed(e.to_string()))?;
             let bytes = method.layers() * self.precision.texel_bytes();
-            if self.lobes_only && method.fit().is_none()
+            if self.lobes_only && !method.carries_attributes()
                 || matches!(limit, Limit::Bytes(most) if bytes > most)
             {
                 continue;
             }
             let progress = Progress::new(spelling);
-            let bake = Bake {
-                surface: self.surface,
-                method: &*method,
-                precision: self.precision,
-                progress: &|f| progress.set(f),
-            };
-            let (pyramid, _) = bake.to_pyramid();
+            let bake = Bake::new(self.surface, &*method).precision(self.precision).observer(&progress);
+            let (pyramid, _) = bake.to_pyramid()?;
             let error = |truth| filtering_error(&pyramid, &*method, self.lobe, &lattice, truth).filtered;
             let error = corners.iter().map(error).fold(0.0, f64::max);
             candidates.push(Candidate { method: spelling.to_owned(), bytes, error });

@@ -3,12 +3,11 @@
 use std::time::Instant;
 
 use ndfmap_core::grid::Size;
+use ndfmap_core::lookup::Lookups;
 use ndfmap_core::metrics::{Picture, change, color_error, relative_l2};
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::Scene;
-use ndfmap_trace::filtered::Lookups;
-use ndfmap_trace::truth::Effort;
+use ndfmap_core::scene::{Effort, Scene};
 use ndfmap_trace::{DRIFT_FRAMES, drifted};
 use serde_json::{Map, Value, json};
 
@@ -94,7 +93,7 @@ pub(crate) fn shoot<E: Engine>(
     for method in shot.methods {
         let start = Instant::now();
         let progress = Progress::new(&format!("bake {}", method));
-        baked.push(engine.bake(&first.materials, &**method, shot.precision, &|f| progress.set(f))?);
+        baked.push(engine.bake(&first.materials, method, shot.precision, &progress)?);
         bake_seconds.push(start.elapsed().as_secs_f64());
     }
     let mut frames = Vec::new();
@@ -118,7 +117,7 @@ fn frame<E: Engine>(
     engine: &E,
     shot: &RenderJob<'_>,
     (scene, time): (&Scene, f64),
-    baked: &[E::Maps<'_>],
+    baked: &[E::Maps],
 ) -> Result<Frame, Failure> {
     let (size, exposure) = (shot.size, scene.exposure);
     let set = engine.set(scene, size)?;
@@ -126,20 +125,21 @@ fn frame<E: Engine>(
     let start = Instant::now();
     let brute = |effort: Effort| {
         let progress = Progress::new("truth");
-        engine.truth(&view, &effort, &|f| progress.set(f))
+        engine.truth(&view, &effort, &progress)
     };
     let truth = shot.truth.map(brute).transpose()?;
     let seconds = start.elapsed().as_secs_f64();
     // A drifting truth is rendered in one go, which only the CPU renderer knows.
-    let drifting = shot.truth.filter(|_| shot.sparkle).map(|effort| {
+    let drift = |effort: Effort| -> Result<DriftReport, Failure> {
         let progress = Progress::new("truth, drifting");
         let geometry = TrueGeometry::new(scene);
         let truth = geometry.truth(scene);
-        true_change(&truth.drift(&scene.camera, size, effort.rays, &|f| progress.set(f)), exposure)
-    });
-    let take = |maps: &E::Maps<'_>| -> Result<(MethodResult, Picture), Failure> {
+        Ok(true_change(&truth.drift(&scene.camera, size, effort.rays, &progress)?, exposure))
+    };
+    let drifting = shot.truth.filter(|_| shot.sparkle).map(drift).transpose()?;
+    let take = |maps: &E::Maps| -> Result<(MethodResult, Picture), Failure> {
         let progress = Progress::new("filtered");
-        let draw = |view: &View<'_, E::Set>| engine.draw(view, maps, shot.lookups, &|f| progress.set(f));
+        let draw = |view: &View<'_, E::Set>| engine.draw(view, maps, shot.lookups, &progress);
         let RenderedPicture { picture, milliseconds } = draw(&view)?;
         let sparkle = |drifting: DriftReport| -> Result<f64, Failure> {
             let moved = |i| draw(&View { camera: drifted(&scene.camera, i), ..view }).map(|d| d.picture);

@@ -8,6 +8,7 @@ use ndfmap_core::grid::Size;
 use ndfmap_core::measure::{
     FilteringError, TexelTruth, filtering_error, lattice_for, level_error, true_corners, true_levels,
 };
+use ndfmap_core::observe::{Cancelled, Observer};
 use ndfmap_core::pyramid::{Precision, Pyramid, level_sizes};
 use ndfmap_core::surface::Surface;
 use serde_json::{Map, Value, json};
@@ -45,34 +46,25 @@ pub(crate) struct Comparison {
 }
 
 /// Bakes and measures.
-pub(crate) fn compare(subject: &Subject<'_>) -> Comparison {
+pub(crate) fn compare(subject: &Subject<'_>) -> Result<Comparison, Cancelled> {
     let lattice = lattice_for(subject.lobe);
     let sizes = level_sizes(subject.surface.size());
     let (truths, corners) = {
         let progress = Progress::new("truth");
         let truth = TexelTruth::new(subject.surface, subject.lobe, &lattice);
+        let whole: &dyn Observer = &progress;
         let part = if subject.filtering { 0.5 } else { 1.0 };
-        let truths = true_levels(&truth, &|f| progress.set(part * f));
+        let truths = true_levels(&truth, &whole.part(0.0, part))?;
         // Level 0 is the map itself, filtered as it has always been.
         let levels: Vec<usize> = if subject.filtering { (1..sizes.len()).collect() } else { Vec::new() };
-        (
-            truths,
-            true_corners(&truth, subject.surface.wraps(), &levels, &|f| {
-                progress.set(part + (1.0 - part) * f)
-            }),
-        )
+        (truths, true_corners(&truth, subject.surface.wraps(), &levels, &whole.part(part, 1.0))?)
     };
     let mut rows = Vec::new();
     for method in subject.methods {
         let progress = Progress::new(&method.to_string());
         let start = Instant::now();
-        let bake = Bake {
-            surface: subject.surface,
-            method: &**method,
-            precision: subject.precision,
-            progress: &|f| progress.set(f),
-        };
-        let (pyramid, _) = bake.to_pyramid();
+        let bake = Bake::new(subject.surface, &**method).precision(subject.precision).observer(&progress);
+        let (pyramid, _) = bake.to_pyramid()?;
         let bake_seconds = start.elapsed().as_secs_f64();
         let error = |truth| level_error(&pyramid, &**method, subject.lobe, &lattice, truth);
         let errors = truths.iter().map(error).collect();
@@ -88,7 +80,7 @@ pub(crate) fn compare(subject: &Subject<'_>) -> Comparison {
             filtering,
         });
     }
-    Comparison { lobe: subject.lobe.to_string(), sizes, rows }
+    Ok(Comparison { lobe: subject.lobe.to_string(), sizes, rows })
 }
 
 impl Comparison {

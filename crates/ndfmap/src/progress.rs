@@ -1,6 +1,7 @@
 //! A progress bar on stderr, shown only when that is a terminal.
 
 use indicatif::{ProgressBar, ProgressStyle};
+use ndfmap_core::observe::Observer;
 
 /// Steps of a bar: finer than any terminal is wide.
 const STEPS: u64 = 1000;
@@ -20,9 +21,10 @@ impl Progress {
         bar.set_message(what.to_owned());
         Self { bar }
     }
+}
 
-    /// Moves it to a fraction.
-    pub(crate) fn set(&self, fraction: f64) {
+impl Observer for Progress {
+    fn progress(&self, fraction: f64) {
         self.bar.set_position((fraction.clamp(0.0, 1.0) * STEPS as f64) as u64);
     }
 }

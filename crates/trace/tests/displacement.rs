@@ -10,16 +10,17 @@ use ndfmap_core::bake::Bake;
 use ndfmap_core::brdf::{AnyLobe, Brdf, Directions, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
-use ndfmap_core::lookup::Filtering;
+use ndfmap_core::lookup::{Filtering, Lookups};
 use ndfmap_core::metrics::Picture;
 use ndfmap_core::ndf::{AnyMethod, FilteredTexel, IncidentLight, Method};
+use ndfmap_core::observe::Unobserved;
 use ndfmap_core::procedural;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{self, Camera, Material, Mesh, Object, Scene, SceneOptions};
+use ndfmap_core::scene::{self, Camera, Effort, Material, Mesh, Object, Scene, SceneOptions};
 use ndfmap_core::surface::{HeightField, SlopeFilter, Surface, Wraps};
 use ndfmap_core::units::SlopeVariance;
-use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
-use ndfmap_trace::truth::{Effort, Truth};
+use ndfmap_trace::filtered::{BakedMaps, Filtered};
+use ndfmap_trace::truth::Truth;
 use ndfmap_trace::{DisplacedMeshes, Geometry};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -67,9 +68,10 @@ fn camera(wo: DVec3) -> Camera {
 fn by_rays(scene: &Scene, rays: usize) -> f64 {
     let (geometry, displacement) = (Geometry::without_displacement(scene), DisplacedMeshes::new(scene));
     let truth = Truth::displaced(scene, &geometry, &displacement);
-    truth.render(&scene.camera, ONE, &Effort { rays, noise: 0.0, seed: 5 }, &|_| ()).picture.texels()[0]
-        .x
-        .into()
+    truth.render(&scene.camera, ONE, &Effort { rays, noise: 0.0, seed: 5 }, &|_| ()).unwrap().picture.texels()
+        [0]
+    .x
+    .into()
 }
 
 /// What a method makes of the whole map, in this light.
@@ -93,7 +95,7 @@ fn by_method(scene: &Scene, channels: &[f32], method: &dyn Method, wo: DVec3) ->
 
 /// The coarsest texel of a method's map.
 fn coarsest(surface: &dyn Surface, method: &dyn Method) -> Vec<f32> {
-    let pyramid = Bake { surface, method, precision: Precision::Single, progress: &|_| () }.to_pyramid().0;
+    let pyramid = Bake::new(surface, method).precision(Precision::Single).to_pyramid().unwrap().0;
     pyramid.texel(pyramid.sizes().len() - 1, 0, 0)
 }
 
@@ -188,7 +190,7 @@ fn errors(deviations: DVec2, lobe: &str, surfaces: u64, rays: usize) -> [f64; 2]
                 scene.lights = lights(directions.wi);
                 let effort = Effort { rays, noise: 0.0, seed };
                 let truth = Truth::displaced(&scene, &geometry, &displacement);
-                let picture = truth.render(&camera(directions.wo), ONE, &effort, &|_| ()).picture;
+                let picture = truth.render(&camera(directions.wo), ONE, &effort, &|_| ()).unwrap().picture;
                 pair.0 += by_method(&scene, &channels, &*method, directions.wo);
                 pair.1 += f64::from(picture.texels()[0].x);
             }
@@ -322,7 +324,7 @@ fn silhouettes_are_defined_over_a_full_turn() {
     // Its tails are never too thin for a float.
     scene.materials[0].brdf.lobe = "ggx:0.3".parse::<AnyLobe>().unwrap();
     let method = "slopes".parse::<AnyMethod>().unwrap();
-    let maps = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
+    let maps = BakedMaps::new(&scene.materials, &method, Precision::Half, &|_| ()).unwrap();
     let mut undefined = [0, 0];
     for rotation in 0..12 {
         let (sin, cos) = (TAU * f64::from(rotation) / 12.0).sin_cos();
@@ -332,9 +334,9 @@ fn silhouettes_are_defined_over_a_full_turn() {
         let geometry = Geometry::displaced(&scene, &scene.camera, size);
         let rays = scene.camera.rays(size);
         for (at_means, undefined) in [false, true].into_iter().zip(&mut undefined) {
-            let filtered = Filtered { scene: &scene, geometry: &geometry, maps: &maps, progress: &|_| () };
+            let filtered = Filtered { scene: &scene, geometry: &geometry, maps: &maps };
             let lookups = Lookups { at_means, ..Lookups::TRILINEAR };
-            let picture = filtered.render(&scene.camera, size, lookups);
+            let picture = filtered.render(&scene.camera, size, lookups, &Unobserved).unwrap();
             for (i, colour) in picture.texels().iter().enumerate() {
                 let at = DVec2::new((i % size.width) as f64 + 0.5, (i / size.width) as f64 + 0.5);
                 let seen = geometry.hit(rays.eye, rays.direction(at)).is_some();
@@ -359,15 +361,16 @@ fn brightness_follows_the_truth_as_relief_becomes_roughness() {
         let mut scene = (scene::find("noise-sphere").unwrap().build)(&staging);
         scene.displace(1.0, false).unwrap();
         let method = "slopes".parse::<AnyMethod>().unwrap();
-        let maps = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
+        let maps = BakedMaps::new(&scene.materials, &method, Precision::Half, &|_| ()).unwrap();
         let geometry = Geometry::displaced(&scene, &scene.camera, size);
-        let filtered = Filtered { scene: &scene, geometry: &geometry, maps: &maps, progress: &|_| () };
-        let lookups = Lookups { filtering: Filtering::fine(16), ..Lookups::TRILINEAR };
-        let seen = filtered.render(&scene.camera, size, lookups);
+        let filtered = Filtered { scene: &scene, geometry: &geometry, maps: &maps };
+        let lookups = Lookups::taps(Filtering::fine(16));
+        let seen = filtered.render(&scene.camera, size, lookups, &Unobserved).unwrap();
         let (plain, displacement) = (Geometry::without_displacement(&scene), DisplacedMeshes::new(&scene));
         let effort = Effort { rays: 64, noise: 0.0, seed: 1 };
-        let truth =
-            Truth::displaced(&scene, &plain, &displacement).render(&scene.camera, size, &effort, &|_| ());
+        let truth = Truth::displaced(&scene, &plain, &displacement)
+            .render(&scene.camera, size, &effort, &|_| ())
+            .unwrap();
         let light = |picture: &Picture| picture.texels().iter().map(|c| f64::from(c.x)).sum::<f64>();
         let ratio = light(&seen) / light(&truth.picture);
         println!("time {time}: {ratio:.4}");

@@ -12,15 +12,16 @@ use glam::{DVec3, Vec3};
 use ndfmap_core::brdf::{Directions, ShadingModel};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
-use ndfmap_core::lookup::Filtering;
+use ndfmap_core::lookup::{Filtering, Lookups};
 use ndfmap_core::metrics::{Picture, relative_l2};
 use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::observe::Unobserved;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{self, Camera, Mesh, Scene, SceneOptions, SurfaceTextures};
+use ndfmap_core::scene::{self, Camera, Effort, Mesh, Scene, SceneOptions, SurfaceTextures};
 use ndfmap_core::surface::{NormalGrid, Surface, SurfaceRow, Wraps};
 use ndfmap_core::{ndf, procedural};
-use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
-use ndfmap_trace::truth::{Effort, Truth};
+use ndfmap_trace::filtered::{BakedMaps, Filtered};
+use ndfmap_trace::truth::Truth;
 use ndfmap_trace::{DRIFT_FRAMES, Geometry, drifted};
 
 /// Mean over all texels of what they reflect, for one way: what a whole map far away looks like.
@@ -165,7 +166,7 @@ fn the_noise_told_is_the_noise_there_is() {
     }
     let geometry = Geometry::new(&scene);
     let effort = Effort { rays: 1 << 14, noise: 0.02, seed: 0 };
-    let enough = Truth::new(&scene, &geometry).render(&scene.camera, size, &effort, &|_| ());
+    let enough = Truth::new(&scene, &geometry).render(&scene.camera, size, &effort, &|_| ()).unwrap();
     assert!(enough.noise <= 0.02 && enough.rays < 1 << 14, "{} after {}", enough.noise, enough.rays);
 }
 
@@ -177,7 +178,7 @@ fn pictures_do_not_depend_on_the_number_of_threads() {
         map: None,
     });
     let size = Size { width: 40, height: 30 };
-    let lookups = Lookups { filtering: Filtering::fine(8), ..Lookups::TRILINEAR };
+    let lookups = Lookups::taps(Filtering::fine(8));
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| (truth(&scene, size, 32, 0).picture, filtered(&scene, "vmf:3", size, lookups)))
@@ -196,11 +197,12 @@ fn a_drift_is_what_drifting_cameras_see() {
     let geometry = Geometry::new(&scene);
     let size = Size { width: 24, height: 24 };
     let brute = Truth::new(&scene, &geometry);
-    let [a, b] = brute.drift(&scene.camera, size, 1024, &|_| ());
+    let [a, b] = brute.drift(&scene.camera, size, 1024, &|_| ()).unwrap();
     assert_eq!((a.len(), b.len()), (DRIFT_FRAMES, DRIFT_FRAMES));
     for frame in [0, 5, DRIFT_FRAMES - 1] {
         let camera = drifted(&scene.camera, frame);
-        let alone = brute.render(&camera, size, &Effort { rays: 2048, noise: 0.0, seed: 9 }, &|_| ());
+        let alone =
+            brute.render(&camera, size, &Effort { rays: 2048, noise: 0.0, seed: 9 }, &|_| ()).unwrap();
         let noise = relative_l2(&a[frame], &b[frame]);
         let far = relative_l2(&a[frame], &alone.picture);
         // Half the rays of `a` against many: the two halves differ by sqrt 2 of what each is off.
@@ -256,16 +258,17 @@ fn lobes_carry_their_colours() {
 #[test]
 fn every_method_shows_every_scene() {
     let size = Size { width: 20, height: 16 };
-    let lookups = Lookups { filtering: Filtering::fine(4), ..Lookups::TRILINEAR };
+    let lookups = Lookups::taps(Filtering::fine(4));
     for row in scene::TABLE {
         let staging = SceneOptions { time: 0.4, map_size: Size { width: 16, height: 16 }, map: None };
         let scene = (row.build)(&staging);
         let geometry = Geometry::new(&scene);
         for method in ndf::TABLE {
             let method = method.samples[0].parse::<AnyMethod>().unwrap();
-            let maps = BakedMaps::new(&scene.materials, &*method, Precision::Half, &|_| ());
-            let picture = Filtered { scene: &scene, geometry: &geometry, maps: &maps, progress: &|_| () }
-                .render(&scene.camera, size, lookups);
+            let maps = BakedMaps::new(&scene.materials, &method, Precision::Half, &|_| ()).unwrap();
+            let picture = Filtered { scene: &scene, geometry: &geometry, maps: &maps }
+                .render(&scene.camera, size, lookups, &Unobserved)
+                .unwrap();
             let sound = picture.texels().iter().all(|p| p.is_finite() && p.min_element() >= 0.0);
             let bright = picture.texels().iter().any(|p| p.max_element() > 0.03);
             assert!(sound && bright, "{} by {}", row.name, method);
@@ -279,9 +282,7 @@ fn finer_filters_are_nearer_to_the_truth() {
     let scene = (scene::find("disk-oblique").unwrap().build)(&staging);
     let size = Size { width: 96, height: 96 };
     let best = truth(&scene, size, 1024, 0).picture;
-    let error = |filtering| {
-        relative_l2(&filtered(&scene, "vmf:4", size, Lookups { filtering, ..Lookups::TRILINEAR }), &best)
-    };
+    let error = |filtering| relative_l2(&filtered(&scene, "vmf:4", size, Lookups::taps(filtering)), &best);
     let (plain, long, fine) =
         (error(Filtering::TRILINEAR), error(Filtering::anisotropic(16)), error(Filtering::fine(16)));
     assert!(fine < long && long < plain, "{plain} {long} {fine}");

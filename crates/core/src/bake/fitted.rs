@@ -2,20 +2,18 @@
 
 use rayon::prelude::*;
 
-use super::{Bake, BakeReport, LevelSink, write_rows};
+use super::{Bake, BakeError, BakeReport, LevelSink, write_rows};
 use crate::fit::{Fit, FitJob, FittedRows, Rgba, fit_levels};
-use crate::grid::Grid;
 
 impl Bake<'_> {
     /// Fits every level and stores its lobes, and after them those of each attribute.
     pub(super) fn run_fitted<S: LevelSink>(
         &self,
         fit: &Fit,
-        attributes: &[Grid<Rgba>],
         sink: &mut S,
-    ) -> Result<BakeReport, S::Error> {
+    ) -> Result<BakeReport, BakeError<S::Error>> {
         let mut report = BakeReport::default();
-        let job = FitJob { surface: self.surface, attributes, progress: self.progress };
+        let job = FitJob { surface: self.surface, attributes: self.attributes, observer: self.observer };
         fit_levels(fit, &job, &mut |rows: &FittedRows<'_>| {
             let mut layers = self.layers_of_lobes(fit.lobes, rows);
             for carried in rows.attributes {
@@ -23,7 +21,7 @@ impl Bake<'_> {
             }
             report.overflowed += layers.iter().map(|l| l.1).sum::<usize>();
             let bytes: Vec<&[u8]> = layers.iter().map(|l| l.0.as_slice()).collect();
-            write_rows(sink, rows.level, rows.rows.start, &bytes)
+            write_rows(sink, rows.level, rows.rows.start, &bytes).map_err(BakeError::Sink)
         })?;
         Ok(report)
     }

@@ -20,6 +20,7 @@ use self::plan::{BAND, Band, Plan, split_layers};
 use crate::fit::Rgba;
 use crate::grid::{Grid, Size};
 use crate::ndf::Method;
+use crate::observe::{Cancelled, Forward, Observer, Unobserved};
 use crate::pyramid::{Layout, LevelMismatch, Precision, Pyramid, footprint, level_sizes};
 use crate::surface::{Surface, SurfaceRow};
 
@@ -51,16 +52,38 @@ pub trait LevelSink {
     }
 }
 
-/// A bake to be done.
+/// Bake of a surface by a method: put together, then [run](Bake::run) into a sink or [into memory](Bake::to_pyramid).
+///
+/// ```
+/// use ndfmap_core::bake::Bake;
+/// use ndfmap_core::grid::Size;
+/// use ndfmap_core::ndf::Vmf;
+/// use ndfmap_core::procedural;
+///
+/// let armour = procedural::find("armour").expect("a built-in map");
+/// let surface = (armour.build)(Size { width: 64, height: 64 });
+/// let (pyramid, _) = Bake::new(&*surface, &Vmf::new(4)?).to_pyramid()?;
+/// assert_eq!((pyramid.layers(), pyramid.sizes().len()), (4, 7));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy)]
 pub struct Bake<'a> {
-    /// The finest level.
-    pub surface: &'a dyn Surface,
-    /// The representation.
-    pub method: &'a dyn Method,
-    /// Bits of a stored channel.
-    pub precision: Precision,
-    /// Called now and then with the fraction done, from one thread.
-    pub progress: &'a (dyn Fn(f64) + Sync),
+    surface: &'a dyn Surface,
+    method: &'a dyn Method,
+    precision: Precision,
+    attributes: &'a [Grid<Rgba>],
+    observer: &'a dyn Observer,
+}
+
+/// Bake that came to no end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BakeError<E> {
+    /// The observer stopped it.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// The sink could not take what was made.
+    #[error("{0}")]
+    Sink(E),
 }
 
 /// What a bake met on its way.
@@ -73,81 +96,98 @@ pub struct BakeReport {
 /// Tasks a thread may have waiting for the sink at once.
 const WAVE: usize = 4;
 
-impl Bake<'_> {
+impl<'a> Bake<'a> {
+    /// Bake into half floats, without attributes, unobserved.
+    #[must_use]
+    pub fn new(surface: &'a dyn Surface, method: &'a dyn Method) -> Self {
+        Self { surface, method, precision: Precision::Half, attributes: &[], observer: &Unobserved }
+    }
+
+    /// The same into channels of this precision.
+    #[must_use]
+    pub fn precision(self, precision: Precision) -> Self {
+        Self { precision, ..self }
+    }
+
+    /// The same with attributes, other maps of the surface's size: each lobe carries its weight times the mean of their values over its
+    /// normals, in a further layer an attribute.
+    ///
+    /// Baking panics when the method's lobes carry none ([`Describe::carries_attributes`]), or one has another size.
+    ///
+    /// [`Describe::carries_attributes`]: crate::ndf::Describe::carries_attributes
+    #[must_use]
+    pub fn attributes(self, attributes: &'a [Grid<Rgba>]) -> Self {
+        Self { attributes, ..self }
+    }
+
+    /// The same for somebody to watch and to stop.
+    #[must_use]
+    pub fn observer(self, observer: &'a dyn Observer) -> Self {
+        Self { observer, ..self }
+    }
+
     /// Size, layers and precision of what will come out.
     #[must_use]
     pub fn layout(&self) -> Layout {
-        self.layout_with(0)
-    }
-
-    /// The same for a map whose lobes carry this many attributes.
-    #[must_use]
-    pub fn layout_with(&self, attributes: usize) -> Layout {
         Layout {
             size: self.surface.size(),
-            layers: self.method.layers_with(attributes),
+            layers: self.method.layers_with(self.attributes.len()),
             precision: self.precision,
             wraps: self.surface.wraps(),
         }
     }
 
     /// Bakes into memory.
-    #[must_use]
-    pub fn to_pyramid(&self) -> (Pyramid, BakeReport) {
-        self.to_pyramid_with(&[])
-    }
-
-    /// Bakes into memory with attributes; see [`Self::run_with`].
-    #[must_use]
-    pub fn to_pyramid_with(&self, attributes: &[Grid<Rgba>]) -> (Pyramid, BakeReport) {
-        let mut sink = MemorySink::new(self.layout_with(attributes.len()));
-        let report = self.run_with(attributes, &mut sink).unwrap_or_else(|never| match never {});
-        (sink.finish(), report)
+    ///
+    /// # Errors
+    /// [`Cancelled`] by the observer.
+    ///
+    /// # Panics
+    /// When there are attributes that the method's lobes do not carry, or one of another size.
+    pub fn to_pyramid(&self) -> Result<(Pyramid, BakeReport), Cancelled> {
+        let mut sink = MemorySink::new(self.layout());
+        match self.run(&mut sink) {
+            Ok(report) => Ok((sink.finish(), report)),
+            Err(BakeError::Cancelled(cancelled)) => Err(cancelled),
+            Err(BakeError::Sink(never)) => match never {},
+        }
     }
 
     /// Bakes into `sink`, every level down to 1 × 1.
     ///
     /// # Errors
-    /// The first error of the sink.
-    pub fn run<S: LevelSink>(&self, sink: &mut S) -> Result<BakeReport, S::Error> {
-        self.run_with(&[], sink)
-    }
-
-    /// Bakes into `sink` with attributes, other maps of the surface's size: each lobe carries its weight times
-    /// the mean of their values over its normals, in further layers, `method.layers()` an attribute.
-    ///
-    /// # Errors
-    /// The first error of the sink.
+    /// The first error of the sink, or [`Cancelled`] by the observer.
     ///
     /// # Panics
-    /// When the method is not fitted and there are attributes, or an attribute has another size.
-    pub fn run_with<S: LevelSink>(
-        &self,
-        attributes: &[Grid<Rgba>],
-        sink: &mut S,
-    ) -> Result<BakeReport, S::Error> {
-        if let Some(fit) = self.method.fit() {
-            return self.run_fitted(&fit, attributes, sink);
+    /// When there are attributes that the method's lobes do not carry, or one of another size.
+    pub fn run<S: LevelSink>(&self, sink: &mut S) -> Result<BakeReport, BakeError<S::Error>> {
+        let carried = self.attributes.is_empty() || self.method.carries_attributes();
+        assert!(carried, "only the lobes of fitted methods carry attributes");
+        let observer = Forward::new(self.observer);
+        let bake = Bake { observer: &observer, ..*self };
+        match self.method.fit() {
+            Some(fit) => bake.run_fitted(&fit, sink),
+            None => bake.run_linear(sink),
         }
-        assert!(attributes.is_empty(), "only the lobes of fitted methods carry attributes");
-        self.run_linear(sink)
     }
 
-    fn run_linear<S: LevelSink>(&self, sink: &mut S) -> Result<BakeReport, S::Error> {
+    fn run_linear<S: LevelSink>(&self, sink: &mut S) -> Result<BakeReport, BakeError<S::Error>> {
         let plan = Plan::new(self.layout());
         let mut report = BakeReport::default();
         let mut sums: Vec<Option<Sums>> = vec![None; plan.sizes.len()];
         sums[plan.kept] = Some(self.finest(&plan, sink, &mut report)?);
         for level in plan.kept + 1..plan.sizes.len() {
             let made = self.coarser(&plan, level, &sums);
-            report.overflowed += self.store(sink, level, &made)?;
+            self.observer.check()?;
+            report.overflowed += self.store(sink, level, &made).map_err(BakeError::Sink)?;
             sums[level] = Some(made);
             for (finer, slot) in sums.iter_mut().enumerate().take(level) {
                 if (level + 1..plan.sizes.len()).all(|later| plan.nearest_nesting(later) != finer) {
                     *slot = None;
                 }
             }
-            (self.progress)(1.0 - 0.1 * (plan.sizes.len() - 1 - level) as f64 / plan.sizes.len() as f64);
+            self.observer
+                .progress(1.0 - 0.1 * (plan.sizes.len() - 1 - level) as f64 / plan.sizes.len() as f64);
         }
         Ok(report)
     }
@@ -158,7 +198,7 @@ impl Bake<'_> {
         plan: &Plan,
         sink: &mut S,
         report: &mut BakeReport,
-    ) -> Result<Sums, S::Error> {
+    ) -> Result<Sums, BakeError<S::Error>> {
         let mut kept = Sums::zero(plan.sizes[plan.kept], plan.layout.layers);
         let bands = plan.bands();
         let (width, layers) = (kept.size.width, kept.layers);
@@ -166,6 +206,9 @@ impl Bake<'_> {
         let kept_bands = split_layers(&mut kept.values, layers, &lengths);
         let pool = ScratchPool::default();
         let make = |band: &Band, mut outputs: BandOutputs<'_>| {
+            if self.observer.cancelled() {
+                return 0;
+            }
             let mut scratch = pool.take(|| Scratch::new(plan));
             let overflowed = self.band(plan, band, &mut outputs, &mut scratch);
             pool.give(scratch);
@@ -182,7 +225,8 @@ impl Bake<'_> {
                 stored.into_iter().zip(kept_bands).map(|(stored, kept)| BandOutputs { stored, kept });
             let work = bands.par_iter().zip(outputs.collect::<Vec<_>>());
             report.overflowed += work.map(|(band, outputs)| make(band, outputs)).sum::<usize>();
-            (self.progress)(0.9);
+            self.observer.check()?;
+            self.observer.progress(0.9);
             return Ok(kept);
         }
         let wave = WAVE * rayon::current_num_threads();
@@ -201,12 +245,14 @@ impl Bake<'_> {
                 make(band, BandOutputs { stored, kept })
             });
             report.overflowed += overflowed.sum::<usize>();
+            self.observer.check()?;
             for (band, buffers) in bands.iter().zip(&buffers) {
                 for (level, layers) in buffers.iter().enumerate() {
-                    write_rows(sink, level, band.rows(plan, level).start, layers)?;
+                    write_rows(sink, level, band.rows(plan, level).start, layers).map_err(BakeError::Sink)?;
                 }
             }
-            (self.progress)(0.9 * ((done + 1) * wave * BAND) as f64 / plan.unit().height as f64);
+            self.observer
+                .progress(0.9 * (((done + 1) * wave * BAND) as f64 / plan.unit().height as f64).min(1.0));
         }
         Ok(kept)
     }

@@ -35,6 +35,7 @@ use self::matching::match_lobes;
 use self::refine::LevelLobes;
 use self::samples::{SampleGrid, Samples, Samplings};
 use crate::grid::{Grid, Size};
+use crate::observe::{Cancelled, Observer};
 use crate::pyramid::{footprint, level_sizes};
 use crate::surface::{Surface, SurfaceRow};
 use crate::words;
@@ -115,8 +116,8 @@ pub struct FitJob<'a> {
     pub surface: &'a dyn Surface,
     /// Other maps of the same size whose values each lobe is to carry.
     pub attributes: &'a [Grid<Rgba>],
-    /// Called now and then with the fraction done, from one thread.
-    pub progress: &'a (dyn Fn(f64) + Sync),
+    /// Who watches.
+    pub observer: &'a dyn Observer,
 }
 
 /// Fitted rows of a level.
@@ -169,11 +170,11 @@ const LEAST_WEIGHT: f32 = 1.0 / 8192.0;
 /// Fits every level and hands on its rows, each once, levels in no particular order.
 ///
 /// # Errors
-/// The first error of `emit`, at which it stops.
+/// The first error of `emit`, at which it stops, or [`Cancelled`] by the observer.
 ///
 /// # Panics
 /// When an attribute has another size than the surface, peaks are to carry one, or `lobes` is out of range.
-pub fn fit_levels<E>(
+pub fn fit_levels<E: From<Cancelled>>(
     fit: &Fit,
     job: &FitJob<'_>,
     emit: &mut dyn FnMut(&FittedRows<'_>) -> Result<(), E>,
@@ -234,17 +235,20 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
         Self { family, fit, job, sizes, samplings }
     }
 
-    fn run<E>(&self, emit: &mut dyn FnMut(&FittedRows<'_>) -> Result<(), E>) -> Result<(), E> {
-        (self.job.progress)(0.05);
+    fn run<E: From<Cancelled>>(
+        &self,
+        emit: &mut dyn FnMut(&FittedRows<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        self.job.observer.progress(0.05);
         match self.fit.alignment {
             Alignment::Unaligned => {
-                for (level, made) in self.alone().into_iter().enumerate().skip(1) {
+                for (level, made) in self.alone()?.into_iter().enumerate().skip(1) {
                     self.hand_on(level, &made, emit)?;
                 }
                 self.finest(None, emit)
             }
             Alignment::Matched => {
-                let mut levels = self.alone();
+                let mut levels = self.alone()?;
                 for coarse in (1..levels.len() - 1).rev() {
                     let (finer, parents) = levels.split_at_mut(coarse + 1);
                     let (parent, child) = (&parents[0], &mut finer[coarse]);
@@ -262,9 +266,10 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
                 let mut parent: Option<Level<N>> = None;
                 for level in (1..self.sizes.len()).rev() {
                     let made = self.descend(level, parent.as_ref());
+                    self.job.observer.check()?;
                     self.hand_on(level, &made, emit)?;
                     parent = Some(made);
-                    (self.job.progress)(1.0 - 0.9 * level as f64 / self.sizes.len() as f64);
+                    self.job.observer.progress(1.0 - 0.9 * level as f64 / self.sizes.len() as f64);
                 }
                 self.finest(parent.as_ref(), emit)
             }
@@ -278,13 +283,16 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
 
     /// Every level above the finest, each texel by itself: the likeliest that EM finds from the normals furthest apart, from
     /// the furthest of the lobes of the finer texels below it, and from seeds drawn at random.
-    fn alone(&self) -> Vec<Level<N>> {
+    fn alone(&self) -> Result<Vec<Level<N>>, Cancelled> {
         let lobes = self.fit.lobes;
         let mut levels = vec![Level { size: self.sizes[0], sums: Vec::new() }];
         for level in 1..self.sizes.len() {
             let mut made = self.empty(level);
             let (size, finer) = (made.size, &levels[level - 1]);
             each_texel(self.samplings.for_level(size), &mut made, lobes, |i, samples, sums| {
+                if self.job.observer.cancelled() {
+                    return;
+                }
                 let mut likeliest = f64::MIN;
                 let mut own = [[0.0; N]; MAX_LOBES];
                 let own = &mut own[..lobes];
@@ -307,9 +315,10 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
                 }
             });
             levels.push(made);
-            (self.job.progress)(0.05 + 0.85 * level as f64 / self.sizes.len() as f64);
+            self.job.observer.check()?;
+            self.job.observer.progress(0.05 + 0.85 * level as f64 / self.sizes.len() as f64);
         }
-        levels
+        Ok(levels)
     }
 
     /// A level started from its parent; the coarsest, which has none, by [`Self::start`].
@@ -329,6 +338,9 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
         let prior = self.fit.alignment == Alignment::Prior && parent.is_some();
         let thetas = parent.map(|p| p.thetas(family, lobes, 0..p.size.height));
         each_texel(grid, &mut made, lobes, |i, samples, sums| {
+            if self.job.observer.cancelled() {
+                return;
+            }
             match (parent, &thetas) {
                 (Some(parent), Some(thetas)) => {
                     let over = parent.index_over(size, at(size, i));
@@ -340,6 +352,9 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
                 iterate(family, samples, rounds, sums);
             }
         });
+        if self.job.observer.cancelled() {
+            return made;
+        }
         if let (true, Some(parent)) = (prior, parent) {
             let (wraps, finest) = (self.job.surface.wraps(), self.sizes[0].area());
             family.fit_with_prior(&PriorContext { grid, parent, lobes, wraps, finest }, &mut made);
@@ -431,7 +446,7 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
     }
 
     /// The finest level, band by band: each normal is one lobe, in the place that its parent gives it.
-    fn finest<E>(
+    fn finest<E: From<Cancelled>>(
         &self,
         parent: Option<&Level<N>>,
         emit: &mut dyn FnMut(&FittedRows<'_>) -> Result<(), E>,
@@ -442,6 +457,7 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
         let mut attributes: Vec<Vec<Rgba>> = vec![Vec::new(); self.job.attributes.len()];
         let mut places = Vec::new();
         for start in (0..size.height).step_by(BAND) {
+            self.job.observer.check()?;
             let rows = start..(start + BAND).min(size.height);
             let texels = rows.len() * size.width;
             places.resize(texels, 0_usize);
@@ -486,7 +502,7 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
                 sums: sums.as_flattened(),
                 attributes: &attributes,
             })?;
-            (self.job.progress)(0.9 + 0.1 * rows.end as f64 / size.height as f64);
+            self.job.observer.progress(0.9 + 0.1 * rows.end as f64 / size.height as f64);
         }
         Ok(())
     }

@@ -16,6 +16,7 @@ use super::em::{iterate, start_from_furthest};
 use super::family::{Isotropic, Spherical};
 use super::samples::{Samples, Samplings};
 use super::{FitJob, FittedRows, PARENT_ROUNDS, at};
+use crate::observe::Cancelled;
 use crate::pyramid::level_sizes;
 
 /// Exponent of the lobe through which normals are seen.
@@ -34,7 +35,7 @@ const MARGIN: f32 = 0.2;
 const ONE_DIRECTION: f32 = 1e-5;
 
 /// Fits every texel of every level by itself.
-pub(super) fn fit_levels<E>(
+pub(super) fn fit_levels<E: From<Cancelled>>(
     peaks: usize,
     job: &FitJob<'_>,
     emit: &mut dyn FnMut(&FittedRows<'_>) -> Result<(), E>,
@@ -49,6 +50,7 @@ pub(super) fn fit_levels<E>(
         // In bands, so that progress shows: a texel takes about a millisecond.
         let band = (4096 / size.width).max(1);
         for start in (0..size.height).step_by(band) {
+            job.observer.check()?;
             let rows = start..(start + band).min(size.height);
             let mut sums = vec![[0.0; 4]; rows.len() * size.width * peaks];
             sums.par_chunks_mut(peaks).enumerate().for_each_init(Samples::default, |samples, (i, peaks)| {
@@ -58,7 +60,7 @@ pub(super) fn fit_levels<E>(
             done += rows.len() * size.width;
             let sums = sums.as_flattened();
             emit(&FittedRows { level, size: *size, rows, statistics: 4, sums, attributes: &[] })?;
-            (job.progress)(done as f64 / total as f64);
+            job.observer.progress(done as f64 / total as f64);
         }
     }
     Ok(())

@@ -15,6 +15,7 @@ use crate::brdf::Lobe;
 use crate::grid::Size;
 use crate::lookup::{Tap, Texels};
 use crate::ndf::{Evaluator, Method};
+use crate::observe::{Cancelled, Observer};
 use crate::pyramid::{Pyramid, level_sizes};
 use crate::sphere::DiskLattice;
 use crate::surface::Wraps;
@@ -49,22 +50,27 @@ pub struct FilteringError {
 }
 
 /// Corners of every level that has more than one texel, with their truth; the same for every method.
-#[must_use]
+///
+/// # Errors
+/// [`Cancelled`] by the observer.
 pub fn true_corners(
     truth: &TexelTruth<'_>,
     wraps: Wraps,
     levels: &[usize],
-    progress: &(dyn Fn(f64) + Sync),
-) -> Vec<TrueCorners> {
+    observer: &dyn Observer,
+) -> Result<Vec<TrueCorners>, Cancelled> {
     let sizes = level_sizes(truth.size());
     let measured: Vec<usize> =
         levels.iter().copied().filter(|l| sizes.get(*l).is_some_and(|s| s.area() > 1)).collect();
     let of_level = |(done, level): (usize, &usize)| {
         let corners = corners_of(sizes[*level], wraps, *level);
-        let true_lobes = |corner: &Corner| corner.map(|(x, y)| truth.texel(sizes[*level], x, y));
-        let lobes = corners.par_iter().map(true_lobes).collect();
-        progress((done + 1) as f64 / measured.len() as f64);
-        TrueCorners { level: *level, size: sizes[*level], corners, lobes }
+        let true_lobes = |corner: &Corner| {
+            observer.check()?;
+            Ok(corner.map(|(x, y)| truth.texel(sizes[*level], x, y)))
+        };
+        let lobes = corners.par_iter().map(true_lobes).collect::<Result<_, Cancelled>>()?;
+        observer.progress((done + 1) as f64 / measured.len() as f64);
+        Ok(TrueCorners { level: *level, size: sizes[*level], corners, lobes })
     };
     measured.iter().enumerate().map(of_level).collect()
 }
@@ -179,7 +185,6 @@ mod tests {
     use crate::measure::DISK_RADIUS;
     use crate::ndf::AnyMethod;
     use crate::procedural;
-    use crate::pyramid::Precision;
 
     /// Errors at level 3 of a built-in map.
     fn errors(map: &str, method: &str) -> FilteringError {
@@ -187,11 +192,10 @@ mod tests {
         let lobe = "blinn-phong:50".parse::<AnyLobe>().unwrap();
         let lattice = DiskLattice::new(40, DISK_RADIUS);
         let truth = TexelTruth::new(&*surface, &*lobe, &lattice);
-        let corners = true_corners(&truth, surface.wraps(), &[3], &|_| ());
+        let corners = true_corners(&truth, surface.wraps(), &[3], &|_| ()).unwrap();
         let method = method.parse::<AnyMethod>().unwrap();
-        let bake =
-            Bake { surface: &*surface, method: &*method, precision: Precision::Half, progress: &|_| () };
-        filtering_error(&bake.to_pyramid().0, &*method, &*lobe, &lattice, &corners[0])
+        let bake = Bake::new(&*surface, &*method);
+        filtering_error(&bake.to_pyramid().unwrap().0, &*method, &*lobe, &lattice, &corners[0])
     }
 
     #[test]

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use crate::brdf::Lobe;
 use crate::grid::Size;
 use crate::ndf::Method;
+use crate::observe::{Cancelled, Observer};
 use crate::pyramid::{Pyramid, footprint, level_sizes};
 use crate::sphere::DiskLattice;
 use crate::surface::{Surface, SurfaceRow};
@@ -141,12 +142,14 @@ pub struct TrueLevel {
     pub lobes: Vec<Vec<f64>>,
 }
 
-/// The true lobes of every level; calls `progress` with the fraction done.
+/// The true lobes of every level.
 ///
 /// Levels with more than [`MAX_TEXELS`] texels are sampled, with a fixed seed, so that two methods are
 /// measured on the same texels. A level in whose texels those of a finer one nest is averaged from it.
-#[must_use]
-pub fn true_levels(truth: &TexelTruth<'_>, progress: &(dyn Fn(f64) + Sync)) -> Vec<TrueLevel> {
+///
+/// # Errors
+/// [`Cancelled`] by the observer.
+pub fn true_levels(truth: &TexelTruth<'_>, observer: &dyn Observer) -> Result<Vec<TrueLevel>, Cancelled> {
     let sizes = level_sizes(truth.size);
     let mut levels: Vec<TrueLevel> = Vec::with_capacity(sizes.len());
     for (level, size) in sizes.iter().enumerate() {
@@ -162,12 +165,18 @@ pub fn true_levels(truth: &TexelTruth<'_>, progress: &(dyn Fn(f64) + Sync)) -> V
             Some(finer) => {
                 texels.par_iter().map(|t| mean_of_nested(finer, sizes[finer.level], *size, *t)).collect()
             }
-            None => texels.par_iter().map(|(x, y)| truth.texel(*size, *x, *y)).collect(),
+            None => {
+                let lobe = |(x, y): &(usize, usize)| {
+                    observer.check()?;
+                    Ok(truth.texel(*size, *x, *y))
+                };
+                texels.par_iter().map(lobe).collect::<Result<_, Cancelled>>()?
+            }
         };
         levels.push(TrueLevel { level, texels, lobes });
-        progress((level + 1) as f64 / sizes.len() as f64);
+        observer.progress((level + 1) as f64 / sizes.len() as f64);
     }
-    levels
+    Ok(levels)
 }
 
 fn measured_texels(size: Size, level: usize) -> Vec<(usize, usize)> {
@@ -249,7 +258,7 @@ mod tests {
         let lattice = DiskLattice::new(16, DISK_RADIUS);
         let surface = (procedural::find("foil").unwrap().build)(Size::new(32, 32).unwrap());
         let truth = TexelTruth::new(&*surface, &*lobe, &lattice);
-        let levels = true_levels(&truth, &|_| ());
+        let levels = true_levels(&truth, &|_| ()).unwrap();
         for level in &levels[2..] {
             let size = Size::new(32 >> level.level, 32 >> level.level).unwrap();
             let direct = truth.texel(size, 0, 0);

@@ -29,7 +29,7 @@ fn of_normals(size: (usize, usize), normal: impl FnMut(usize, usize) -> Vec3) ->
 }
 
 fn bake(method: &dyn Method, surface: &dyn Surface, precision: Precision) -> crate::pyramid::Pyramid {
-    Bake { surface, method, precision, progress: &|_| () }.to_pyramid().0
+    Bake::new(surface, method).precision(precision).to_pyramid().unwrap().0
 }
 
 /// What must be the same however normals are shared out among lobes: the channels, summed over fitted lobes.

@@ -171,8 +171,8 @@ fn six_statistics_are_fitted_stored_filtered_and_decoded() {
     let elliptic = Elliptic::new(2);
     let method = AnyMethod::from(elliptic);
     assert_eq!((method.layers(), method.layers_with(1)), (4, 6));
-    let bake = Bake { surface: &surface, method: &*method, precision: Precision::Single, progress: &|_| () };
-    let (pyramid, report) = bake.to_pyramid_with(&[colours]);
+    let bake = Bake::new(&surface, &*method).precision(Precision::Single);
+    let (pyramid, report) = bake.attributes(&[colours]).to_pyramid().unwrap();
     assert_eq!((pyramid.layers(), report.overflowed), (6, 0));
     let layout = method.lobe_layout().unwrap();
     for level in 2..pyramid.sizes().len() {

@@ -6,6 +6,7 @@ use crate::bake::Bake;
 use crate::fit::Rgba;
 use crate::grid::{Grid, Size};
 use crate::ndf::{AnyMethod, Decoded, Method};
+use crate::observe::{Cancelled, Observer};
 use crate::pyramid::{Precision, Pyramid};
 use crate::surface::{Surface, SurfaceRow, Wraps};
 
@@ -22,25 +23,26 @@ pub struct BakedMaterial {
 }
 
 impl BakedMaterial {
-    /// Bakes the map, with the finish in the lobes where the method has lobes that can carry it; `progress` is told the
-    /// fraction done.
-    #[must_use]
+    /// Bakes the map, with colours and roughness in the lobes where the method has lobes that can carry them.
+    ///
+    /// # Errors
+    /// [`Cancelled`] by the observer.
     pub fn new(
         material: &Material,
         method: &dyn Method,
         precision: Precision,
-        progress: &(dyn Fn(f64) + Sync),
-    ) -> Self {
-        let bake = Bake { surface: &*material.surface, method, precision, progress };
+        observer: &dyn Observer,
+    ) -> Result<Self, Cancelled> {
         let maps = material.textures.as_ref().map_or_else(Vec::new, |map| map.grids());
         if let Some(pyramid) = material.surface.baked(method) {
-            return Self { pyramid: pyramid.clone(), attributes: 0, params: maps };
+            return Ok(Self { pyramid: pyramid.clone(), attributes: 0, params: maps });
         }
+        let bake = Bake::new(&*material.surface, method).precision(precision).observer(observer);
         if method.carries_attributes() {
-            let (pyramid, _) = bake.to_pyramid_with(&maps);
-            return Self { pyramid, attributes: maps.len(), params: Vec::new() };
+            let (pyramid, _) = bake.attributes(&maps).to_pyramid()?;
+            return Ok(Self { pyramid, attributes: maps.len(), params: Vec::new() });
         }
-        Self { pyramid: bake.to_pyramid().0, attributes: 0, params: maps }
+        Ok(Self { pyramid: bake.to_pyramid()?.0, attributes: 0, params: maps })
     }
 }
 

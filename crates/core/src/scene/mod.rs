@@ -18,8 +18,10 @@ mod noise_sphere;
 mod plane;
 mod sphere;
 pub mod tessellation;
+mod truth;
 mod v_groove;
 
+pub use self::truth::{Effort, TruePicture};
 pub use baked::{BakedMaterial, BakedSurface};
 pub use camera::{Camera, Rays};
 pub use displacement::Displacement;

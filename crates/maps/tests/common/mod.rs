@@ -96,7 +96,7 @@ pub(crate) fn baked(method: &str, builtin: &str, precision: Precision) -> NdfMap
     let map = read_source(format!("builtin:{builtin}").as_ref(), &options).unwrap();
     assert!(procedural::find(builtin).is_some());
     let method = method.parse::<AnyMethod>().unwrap();
-    let bake = Bake { surface: &*map.surface, method: &*method, precision, progress: &|_| () };
+    let bake = Bake::new(&*map.surface, &*method).precision(precision);
     let header = Header {
         version: VERSION,
         method: method.to_string(),
@@ -107,5 +107,5 @@ pub(crate) fn baked(method: &str, builtin: &str, precision: Precision) -> NdfMap
         attributes: Vec::new(),
         source: map.source,
     };
-    NdfMap { header, pyramid: bake.to_pyramid().0 }
+    NdfMap { header, pyramid: bake.to_pyramid().unwrap().0 }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use ndfmap_core::bake::{Bake as CoreBake, BakeReport, MemorySink};
+use ndfmap_core::bake::{Bake as CoreBake, BakeReport};
 use ndfmap_core::ndf::{AnyMethod, Method};
 use ndfmap_core::pyramid;
 use ndfmap_maps::attribute::{AttributeMap, Transfer, read_attribute};
@@ -177,7 +177,7 @@ impl Bake {
             warn(&self.map, warning);
         }
         let (method, choice) = self.choose(&map)?;
-        if !attributes.is_empty() && !carries_attributes(&*method) {
+        if !attributes.is_empty() && !method.carries_attributes() {
             return Err(Failure::Usage(format!(
                 "`{}` has no lobes that carry attributes; `vmf` and `gmm` have",
                 method
@@ -229,26 +229,26 @@ impl Bake {
         // Bumpslopes of heights change their units, so they are rounded when written, and only then.
         let converts = target == Target::Bumpslopes && map.surface.has_height();
         let precision = if converts { pyramid::Precision::Single } else { self.precision.into() };
-        let bake = CoreBake { surface: &*map.surface, method, precision, progress: &|f| progress.set(f) };
+        let values: Vec<_> = attributes.iter().map(|a| a.values.clone()).collect();
+        let bake =
+            CoreBake::new(&*map.surface, method).precision(precision).attributes(&values).observer(&progress);
         let mut header = header_of(map, method);
         header.attributes = attributes.iter().map(|a| a.attribute.clone()).collect();
-        let values: Vec<_> = attributes.iter().map(|a| a.values.clone()).collect();
-        let layout = bake.layout_with(attributes.len());
+        let layout = bake.layout();
         let start = Instant::now();
         if target == Target::Ktx2 && self.zstd.is_none() {
             // Baked straight into the file, so its time counts as baking; what remains is the rename.
             let mut sink = Ktx2Sink::create(&self.output, &header, layout)?;
-            let report = bake.run_with(&values, &mut sink)?;
+            let report = bake.run(&mut sink)?;
             refuse_overflow(report, &self.output)?;
             let baked = start.elapsed().as_secs_f64();
             let bytes = sink.finish()?;
             return Ok(Done { bytes, bake: baked, write: start.elapsed().as_secs_f64() - baked });
         }
-        let mut sink = MemorySink::new(layout);
-        let report = bake.run_with(&values, &mut sink).unwrap_or_else(|never| match never {});
+        let (pyramid, report) = bake.to_pyramid()?;
         refuse_overflow(report, &self.output)?;
         let baked = start.elapsed().as_secs_f64();
-        let map = NdfMap { header, pyramid: sink.finish() };
+        let map = NdfMap { header, pyramid };
         let bytes = match (target, self.zstd) {
             (Target::Bumpslopes, _) => write_bumpslopes(&self.output, &map, self.precision.into())?,
             (Target::Ktx2, Some(level)) => write_compressed(&self.output, &map, level)?,
@@ -256,11 +256,6 @@ impl Bake {
         };
         Ok(Done { bytes, bake: baked, write: start.elapsed().as_secs_f64() - baked })
     }
-}
-
-/// Lobes that are sums over normals can carry what belongs to those; peaks cannot.
-fn carries_attributes(method: &dyn Method) -> bool {
-    method.fit().is_some() && method.filterable()
 }
 
 struct Done {

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use clap::Args;
 use ndfmap_core::brdf::{AnyLobe, Lobe};
 use ndfmap_core::grid::Size;
+use ndfmap_core::lookup::Lookups;
 use ndfmap_core::pyramid;
+use ndfmap_core::scene::Effort;
 use ndfmap_maps::source::{SourceMap, read_source};
-use ndfmap_trace::filtered::Lookups;
-use ndfmap_trace::truth::Effort;
 
 use super::arguments::{
     BuiltinSize, EnvironmentArguments, Precision, SourceArguments, brdf_spelling, brdfs_help, method,
@@ -181,7 +181,7 @@ impl Run<'_> {
             precision: self.precision,
             filtering: self.filtering,
         };
-        let comparison = measure::compare(&subject);
+        let comparison = measure::compare(&subject)?;
         let mut written = Vec::new();
         if let Some(folder) = folder {
             let pages = Pages {

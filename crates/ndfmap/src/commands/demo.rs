@@ -6,12 +6,11 @@ use std::time::Instant;
 use clap::Args;
 use ndfmap_core::bake::Bake;
 use ndfmap_core::grid::Size;
-use ndfmap_core::lookup::Filtering;
+use ndfmap_core::lookup::{Filtering, Lookups};
 use ndfmap_core::pyramid::Precision;
+use ndfmap_core::scene::Effort;
 use ndfmap_maps::formats::ktx2::Ktx2Sink;
 use ndfmap_maps::source::{SourceOptions, read_source};
-use ndfmap_trace::filtered::Lookups;
-use ndfmap_trace::truth::Effort;
 
 use super::arguments::{method, read_brdf};
 use super::bake::header_of;
@@ -54,7 +53,7 @@ fn sheet(scene: &str, times: &[f64]) -> Result<Vec<u8>, Failure> {
         methods: &methods,
         size: Size { width: 224, height: 224 },
         precision: Precision::Half,
-        lookups: Lookups { filtering: Filtering::fine(16), ..Lookups::TRILINEAR },
+        lookups: Lookups::taps(Filtering::fine(16)),
         truth: Some(Effort { rays: 128, noise: 0.0, seed: 0 }),
         sparkle: false,
         keep: true,
@@ -89,8 +88,7 @@ impl Demo {
         let path = self.output.join("foil.slopes.ktx2");
         say_if_replaced(&path);
         let slopes = method("slopes")?;
-        let bake =
-            Bake { surface: &*map.surface, method: &*slopes, precision: Precision::Half, progress: &|_| () };
+        let bake = Bake::new(&*map.surface, &*slopes);
         let mut sink = Ktx2Sink::create(&path, &header_of(&map, &*slopes), bake.layout())?;
         bake.run(&mut sink)?;
         sink.finish()?;

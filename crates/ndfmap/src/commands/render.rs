@@ -9,15 +9,13 @@ use glam::DVec3;
 use ndfmap_core::brdf::ShadingModel;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
-use ndfmap_core::lookup::Filtering;
-use ndfmap_core::scene::{self, BakedSurface};
+use ndfmap_core::lookup::{Filtering, Lookups, Sampling};
+use ndfmap_core::scene::{self, BakedSurface, Effort};
 use ndfmap_core::surface::Surface;
 use ndfmap_core::tone::Tone;
 use ndfmap_maps::formats::{read_file, read_ndf};
 use ndfmap_maps::picture::{PictureFormat, write_picture};
 use ndfmap_maps::source::{BUILTIN_PREFIX, read_source};
-use ndfmap_trace::filtered::Lookups;
-use ndfmap_trace::truth::Effort;
 use serde_json::json;
 
 use super::arguments::{
@@ -172,7 +170,7 @@ pub(super) struct FilterArguments {
 impl FilterArguments {
     pub(super) fn lookups(&self) -> Lookups {
         Lookups {
-            filtering: Filtering { lod_bias: self.lod_bias, ..self.filter },
+            sampling: Sampling::Taps(Filtering { lod_bias: self.lod_bias, ..self.filter }),
             neighbours: self.neighbours,
             at_means: self.at_means,
         }
@@ -405,7 +403,7 @@ impl Render {
     ) -> Result<RenderReport, Failure> {
         #[cfg(feature = "gpu")]
         if let Some(device) = self.device.open()? {
-            let gpu = Gpu::new(&device, self.sampler, self.multisample);
+            let gpu = Gpu::new(device, self.sampler, self.multisample);
             let shot_there = gpu.and_then(|gpu| shoot(&gpu, shot, each));
             match shot_there {
                 // What this GPU cannot do, the processor can; `auto` asked for no more than a picture.

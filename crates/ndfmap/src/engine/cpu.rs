@@ -3,12 +3,14 @@
 use std::time::Instant;
 
 use ndfmap_core::grid::Size;
-use ndfmap_core::ndf::Method;
+use ndfmap_core::lookup::Lookups;
+use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::observe::Observer;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{Material, Scene};
+use ndfmap_core::scene::{Effort, Material, Scene, TruePicture};
 use ndfmap_trace::Geometry;
-use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
-use ndfmap_trace::truth::{Effort, TruePicture, Truth};
+use ndfmap_trace::filtered::{BakedMaps, Filtered};
+use ndfmap_trace::truth::Truth;
 use serde_json::{Value, json};
 
 use super::{Engine, RenderedPicture, TrueGeometry, View};
@@ -18,21 +20,21 @@ use crate::Failure;
 pub(crate) struct Cpu;
 
 impl Engine for Cpu {
-    type Maps<'a> = BakedMaps<'a>;
+    type Maps = BakedMaps;
     type Set = Geometry;
 
     fn describe(&self) -> Value {
         json!({ "device": "cpu" })
     }
 
-    fn bake<'a>(
-        &'a self,
+    fn bake(
+        &self,
         materials: &[Material],
-        method: &'a dyn Method,
+        method: &AnyMethod,
         precision: Precision,
-        progress: &(dyn Fn(f64) + Sync),
-    ) -> Result<BakedMaps<'a>, Failure> {
-        Ok(BakedMaps::new(materials, method, precision, progress))
+        observer: &dyn Observer,
+    ) -> Result<BakedMaps, Failure> {
+        Ok(BakedMaps::new(materials, method, precision, observer)?)
     }
 
     fn set(&self, scene: &Scene, size: Size) -> Result<Geometry, Failure> {
@@ -49,25 +51,26 @@ impl Engine for Cpu {
         &self,
         view: &View<'_, Geometry>,
         effort: &Effort,
-        progress: &(dyn Fn(f64) + Sync),
+        observer: &dyn Observer,
     ) -> Result<TruePicture, Failure> {
         if !view.scene.is_displaced() {
-            return Ok(Truth::new(view.scene, view.set).render(&view.camera, view.size, effort, progress));
+            let truth = Truth::new(view.scene, view.set);
+            return Ok(truth.render(&view.camera, view.size, effort, observer)?);
         }
         let true_geometry = TrueGeometry::new(view.scene);
-        Ok(true_geometry.truth(view.scene).render(&view.camera, view.size, effort, progress))
+        Ok(true_geometry.truth(view.scene).render(&view.camera, view.size, effort, observer)?)
     }
 
     fn draw(
         &self,
         view: &View<'_, Geometry>,
-        maps: &BakedMaps<'_>,
+        maps: &BakedMaps,
         lookups: Lookups,
-        progress: &(dyn Fn(f64) + Sync),
+        observer: &dyn Observer,
     ) -> Result<RenderedPicture, Failure> {
-        let filtered = Filtered { scene: view.scene, geometry: view.set, maps, progress };
+        let filtered = Filtered { scene: view.scene, geometry: view.set, maps };
         let start = Instant::now();
-        let picture = filtered.render(&view.camera, view.size, lookups);
+        let picture = filtered.render(&view.camera, view.size, lookups, observer)?;
         Ok(RenderedPicture { picture, milliseconds: start.elapsed().as_secs_f64() * 1e3 })
     }
 }

@@ -1,24 +1,24 @@
 //! A GPU renders: `ndfmap-gpu`.
 
 use ndfmap_core::grid::Size;
-use ndfmap_core::ndf::Method;
+use ndfmap_core::lookup::{Lookups, Sampling};
+use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::observe::Observer;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{Material, Scene};
+use ndfmap_core::scene::{Effort, Material, Scene, TruePicture};
 use ndfmap_gpu::{
-    Antialiasing, Canvas, Device, Effort, FinestMaps, Geometry, GpuError, Lookups, Maps, Meshes, Renderer,
-    Sampling, SceneView,
+    Antialiasing, Canvas, Device, FinestMaps, Frame, Geometry, GpuError, Maps, Meshes, Renderer, SceneView,
+    TrueFrame,
 };
-use ndfmap_trace::filtered;
-use ndfmap_trace::truth::{self, TruePicture};
 use serde_json::{Value, json};
 
 use super::{Engine, RenderedPicture, TrueGeometry, View};
 use crate::Failure;
 
 /// A GPU, and how it draws.
-pub(crate) struct Gpu<'a> {
-    device: &'a Device,
-    renderer: Renderer<'a>,
+pub(crate) struct Gpu {
+    device: Device,
+    renderer: Renderer,
     /// The device's own sampler filters, with so many taps, in place of ours.
     sampler: Option<u16>,
     outlines: Antialiasing,
@@ -29,16 +29,17 @@ impl From<GpuError> for Failure {
         match error {
             // No device is to blame.
             GpuError::Shader(_) => Self::Failed(error.to_string()),
+            GpuError::Cancelled(cancelled) => Self::Cancelled(cancelled),
             _ => Self::Failed(format!("{error} (`--device cpu` renders without a GPU)")),
         }
     }
 }
 
-impl<'a> Gpu<'a> {
+impl Gpu {
     /// Prepares to draw on a device.
-    pub(crate) fn new(device: &'a Device, sampler: Option<u16>, multisample: bool) -> Result<Self, Failure> {
+    pub(crate) fn new(device: Device, sampler: Option<u16>, multisample: bool) -> Result<Self, Failure> {
         let outlines = if multisample { Antialiasing::Multisampled } else { Antialiasing::Parts };
-        Ok(Self { device, renderer: Renderer::new(device)?, sampler, outlines })
+        Ok(Self { renderer: Renderer::new(&device)?, device, sampler, outlines })
     }
 
     fn shown<'v>(view: &'v View<'_, Geometry>) -> SceneView<'v> {
@@ -46,11 +47,8 @@ impl<'a> Gpu<'a> {
     }
 }
 
-impl Engine for Gpu<'_> {
-    type Maps<'a>
-        = Maps<'a>
-    where
-        Self: 'a;
+impl Engine for Gpu {
+    type Maps = Maps;
     type Set = Geometry;
 
     fn describe(&self) -> Value {
@@ -63,54 +61,52 @@ impl Engine for Gpu<'_> {
         })
     }
 
-    fn bake<'a>(
-        &'a self,
+    fn bake(
+        &self,
         materials: &[Material],
-        method: &'a dyn Method,
+        method: &AnyMethod,
         precision: Precision,
-        progress: &(dyn Fn(f64) + Sync),
-    ) -> Result<Maps<'a>, Failure> {
-        Ok(Maps::new(self.device, materials, method, precision, progress)?)
+        observer: &dyn Observer,
+    ) -> Result<Maps, Failure> {
+        Ok(Maps::new(&self.device, materials, method, precision, observer)?)
     }
 
     fn set(&self, scene: &Scene, size: Size) -> Result<Geometry, Failure> {
-        Ok(Meshes::new(self.device, scene)?.cut(&scene.camera, size)?)
+        Ok(Meshes::new(&self.device, scene)?.cut(&scene.camera, size)?)
     }
 
     fn truth(
         &self,
         view: &View<'_, Geometry>,
-        effort: &truth::Effort,
-        progress: &(dyn Fn(f64) + Sync),
+        effort: &Effort,
+        observer: &dyn Observer,
     ) -> Result<TruePicture, Failure> {
         if view.scene.is_displaced() || view.scene.environment.is_some() {
             // Facets of relief are rays' business, and so is light that is drawn by chance.
             let geometry = TrueGeometry::new(view.scene);
-            return Ok(geometry.truth(view.scene).render(&view.camera, view.size, effort, progress));
+            return Ok(geometry.truth(view.scene).render(&view.camera, view.size, effort, observer)?);
         }
-        let canvas = Canvas::new(self.device, view.size, Antialiasing::Sharp)?;
-        let finest = FinestMaps::new(self.device, &view.scene.materials)?;
-        let effort = Effort { samples: effort.rays, noise: effort.noise, progress };
-        let truth = self.renderer.truth(&canvas, &Self::shown(view), &finest, &effort)?;
-        Ok(TruePicture { picture: truth.picture, rays: truth.samples, noise: truth.noise })
+        let canvas = Canvas::new(&self.device, view.size, Antialiasing::Sharp)?;
+        let finest = FinestMaps::new(&self.device, &view.scene.materials)?;
+        let frame = TrueFrame { view: Self::shown(view), finest: &finest };
+        Ok(self.renderer.truth(&canvas, &frame, effort, observer)?)
     }
 
     fn draw(
         &self,
         view: &View<'_, Geometry>,
-        maps: &Maps<'_>,
-        lookups: filtered::Lookups,
-        _progress: &(dyn Fn(f64) + Sync),
+        maps: &Maps,
+        lookups: Lookups,
+        _observer: &dyn Observer,
     ) -> Result<RenderedPicture, Failure> {
-        let filtered::Lookups { filtering, neighbours, at_means } = lookups;
-        let sampling = self.sampler.map_or(Sampling::Taps(filtering), Sampling::Sampler);
-        let lookups = Lookups { sampling, neighbours, at_means };
-        let canvas = Canvas::new(self.device, view.size, self.outlines)?;
-        let shown = Self::shown(view);
-        self.renderer.draw(&canvas, &shown, maps, lookups)?;
+        let sampling = self.sampler.map_or(lookups.sampling, Sampling::Sampler);
+        let lookups = Lookups { sampling, ..lookups };
+        let canvas = Canvas::new(&self.device, view.size, self.outlines)?;
+        let frame = Frame { view: Self::shown(view), maps, lookups };
+        self.renderer.draw(&canvas, &frame)?;
         let picture = canvas.read()?;
         // The picture's own passes made pipelines and read the result back: a frame like the next one tells what it takes.
-        let milliseconds = self.renderer.time(&canvas, &shown, maps, lookups)?;
+        let milliseconds = self.renderer.time(&canvas, &frame)?;
         Ok(RenderedPicture { picture, milliseconds })
     }
 }

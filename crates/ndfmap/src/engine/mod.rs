@@ -9,12 +9,13 @@ pub(crate) use cpu::Cpu;
 pub(crate) use gpu::Gpu;
 
 use ndfmap_core::grid::Size;
+use ndfmap_core::lookup::Lookups;
 use ndfmap_core::metrics::Picture;
-use ndfmap_core::ndf::Method;
+use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::observe::Observer;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{Camera, Material, Scene};
-use ndfmap_trace::filtered::Lookups;
-use ndfmap_trace::truth::{Effort, TruePicture, Truth};
+use ndfmap_core::scene::{Camera, Effort, Material, Scene, TruePicture};
+use ndfmap_trace::truth::Truth;
 use ndfmap_trace::{DisplacedMeshes, Geometry};
 use serde_json::Value;
 
@@ -62,9 +63,7 @@ impl TrueGeometry {
 /// What renders.
 pub(crate) trait Engine {
     /// Maps baked for it.
-    type Maps<'a>
-    where
-        Self: 'a;
+    type Maps;
 
     /// A scene's triangles, and what else it keeps of a scene.
     type Set;
@@ -72,14 +71,14 @@ pub(crate) trait Engine {
     /// What it is, as JSON: `device`, and what else there is to say.
     fn describe(&self) -> Value;
 
-    /// Bakes a scene's maps; `progress` is told the fraction done.
-    fn bake<'a>(
-        &'a self,
+    /// Bakes a scene's maps.
+    fn bake(
+        &self,
         materials: &[Material],
-        method: &'a dyn Method,
+        method: &AnyMethod,
         precision: Precision,
-        progress: &(dyn Fn(f64) + Sync),
-    ) -> Result<Self::Maps<'a>, Failure>;
+        observer: &dyn Observer,
+    ) -> Result<Self::Maps, Failure>;
 
     /// Sets a scene up for pictures of this size from where its camera is, or less than a pixel away.
     fn set(&self, scene: &Scene, size: Size) -> Result<Self::Set, Failure>;
@@ -89,15 +88,15 @@ pub(crate) trait Engine {
         &self,
         view: &View<'_, Self::Set>,
         effort: &Effort,
-        progress: &(dyn Fn(f64) + Sync),
+        observer: &dyn Observer,
     ) -> Result<TruePicture, Failure>;
 
     /// Renders through maps.
     fn draw(
         &self,
         view: &View<'_, Self::Set>,
-        maps: &Self::Maps<'_>,
+        maps: &Self::Maps,
         lookups: Lookups,
-        progress: &(dyn Fn(f64) + Sync),
+        observer: &dyn Observer,
     ) -> Result<RenderedPicture, Failure>;
 }

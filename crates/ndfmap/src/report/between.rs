@@ -8,6 +8,7 @@ use ndfmap_core::fit::{Alignment, LobeKind};
 use ndfmap_core::lookup::{Tap, Texels};
 use ndfmap_core::measure::{TexelTruth, evaluate_neighbours};
 use ndfmap_core::ndf::{AnyMethod, Gmm, Method, Vmf};
+use ndfmap_core::observe::Cancelled;
 use ndfmap_core::pyramid::Pyramid;
 use ndfmap_core::sphere::DiskLattice;
 
@@ -22,17 +23,16 @@ const LEVEL: usize = 4;
 const COLUMNS: [&str; 4] = ["histogram", "unaligned", "as baked", "each texel shaded"];
 
 /// Draws a row for every mixture that was compared; `None` when there is none, or no corner to look at.
-pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Option<Canvas> {
+pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Result<Option<Canvas>, Cancelled> {
     let rows: Vec<Mixture<'_>> = comparison.rows.iter().filter_map(mixture).collect();
-    let level = (0..comparison.sizes.len()).rev().find(|l| *l <= LEVEL && comparison.sizes[*l].area() > 1)?;
-    if rows.is_empty() {
-        return None;
-    }
-    let size = comparison.sizes[level];
+    let sizes = &comparison.sizes;
+    let level = (0..sizes.len()).rev().find(|l| *l <= LEVEL && sizes[*l].area() > 1);
+    let Some(level) = level.filter(|_| !rows.is_empty()) else { return Ok(None) };
+    let size = sizes[level];
     let pen = PEN.parse::<AnyLobe>().unwrap_or_else(|e| unreachable!("the pen is a constant: {e}"));
     let lattice = DiskLattice::new(SIDE, 0.99);
     let truth = TexelTruth::new(subject.surface, &*pen, &lattice);
-    let (x, y) = busiest(subject, size);
+    let (x, y) = busiest(subject, size)?;
     let place = DVec2::new((x + 1) as f64 / size.width as f64, (y + 1) as f64 / size.height as f64);
     let disk = SIDE * SCALE;
     let (label, step_x, step_y) = (20 * LETTER, disk.max(18 * LETTER) + 8, disk + LINE);
@@ -50,13 +50,8 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Option<Can
         let y = 2 * LINE + at * step_y;
         canvas.text(8, y + 8, &row.method);
         canvas.text(8, y + 8 + LINE, &format!("level {level}, corner"));
-        let bake = Bake {
-            surface: subject.surface,
-            method: &**unaligned,
-            precision: subject.precision,
-            progress: &|_| (),
-        };
-        let (apart, _) = bake.to_pyramid();
+        let bake = Bake::new(subject.surface, &**unaligned).precision(subject.precision);
+        let (apart, _) = bake.to_pyramid()?;
         let filtered = |pyramid: &Pyramid, method: &dyn Method| {
             let mut out = vec![0.0; lattice.len()];
             let mut channels = vec![0.0; pyramid.channels()];
@@ -73,7 +68,7 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Option<Can
             plot(&mut canvas, &lattice, (label + column * step_x, y), lobe, peak);
         }
     }
-    Some(canvas)
+    Ok(Some(canvas))
 }
 
 /// A mixture's row, its method, and the same method unaligned.

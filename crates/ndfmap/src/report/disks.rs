@@ -1,14 +1,17 @@
 //! What the normals under one texel do, drawn on the unit disk: the truth beside every method.
 
 use glam::Vec3;
+use ndfmap_core::bake::Bake;
 use ndfmap_core::grid::Size;
 use ndfmap_core::measure::TexelTruth;
+use ndfmap_core::ndf::{AnyMethod, Toksvig};
+use ndfmap_core::observe::Cancelled;
+use ndfmap_core::pyramid::Precision;
 use ndfmap_core::sphere::DiskLattice;
 
 use super::canvas::{Canvas, LETTER, LINE, heat};
 use crate::measure::{Comparison, Subject};
 use ndfmap_core::brdf::AnyLobe;
-use ndfmap_core::ndf::AnyMethod;
 
 /// Points of the lattice a side, and pixels a point.
 pub(super) const SIDE: usize = 72;
@@ -21,7 +24,7 @@ pub(super) const PEN: &str = "blinn-phong:200";
 const LEVELS: [usize; 3] = [3, 5, 7];
 
 /// Draws the disks: a row a level, a column a method.
-pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Canvas {
+pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Result<Canvas, Cancelled> {
     let pen = PEN.parse::<AnyLobe>().unwrap_or_else(|e| unreachable!("the pen is a constant: {e}"));
     let lattice = DiskLattice::new(SIDE, 0.99);
     let truth = TexelTruth::new(subject.surface, &*pen, &lattice);
@@ -39,7 +42,7 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Canvas {
     for (at, level) in levels.iter().enumerate() {
         let y = 2 * LINE + at * step_y;
         let size = comparison.sizes[*level];
-        let texel = busiest(subject, size);
+        let texel = busiest(subject, size)?;
         canvas.text(8, y + 8, &format!("level {level}"));
         canvas.text(8, y + 8 + LINE, &format!("({},{})", texel.0, texel.1));
         let true_lobe = truth.texel(size, texel.0, texel.1);
@@ -55,24 +58,17 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Canvas {
             plot(&mut canvas, &lattice, (label + (column + 1) * step_x, y), &lobe, peak);
         }
     }
-    canvas
+    Ok(canvas)
 }
 
 /// The texel of a level whose mean normal is shortest.
-pub(super) fn busiest(subject: &Subject<'_>, size: Size) -> (usize, usize) {
-    use ndfmap_core::bake::Bake;
-    use ndfmap_core::ndf::Toksvig;
-    let bake = Bake {
-        surface: subject.surface,
-        method: &Toksvig,
-        precision: ndfmap_core::pyramid::Precision::Single,
-        progress: &|_| (),
-    };
-    let (pyramid, _) = bake.to_pyramid();
+pub(super) fn busiest(subject: &Subject<'_>, size: Size) -> Result<(usize, usize), Cancelled> {
+    let bake = Bake::new(subject.surface, &Toksvig).precision(Precision::Single);
+    let (pyramid, _) = bake.to_pyramid()?;
     let level = pyramid.sizes().iter().position(|s| *s == size).unwrap_or(0);
     let length = |(x, y): &(usize, usize)| Vec3::from_slice(&pyramid.texel(level, *x, *y)).length();
     let texels = (0..size.area()).map(|i| (i % size.width, i / size.width));
-    texels.min_by(|a, b| length(a).total_cmp(&length(b))).unwrap_or((0, 0))
+    Ok(texels.min_by(|a, b| length(a).total_cmp(&length(b))).unwrap_or((0, 0)))
 }
 
 pub(super) fn plot(

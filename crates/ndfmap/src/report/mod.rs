@@ -30,10 +30,10 @@ pub(crate) struct Pages<'a> {
 /// Draws every file of a report: names and bytes.
 pub(crate) fn draw(pages: &Pages<'_>) -> Result<Vec<(&'static str, Vec<u8>)>, Failure> {
     let sheet = sheet::draw(pages.subject, pages.comparison).to_png()?;
-    let disks = disks::draw(pages.subject, pages.comparison).to_png()?;
+    let disks = disks::draw(pages.subject, pages.comparison)?.to_png()?;
     // It bakes every mixture once more, unaligned: seconds that only those who ask about filtering should wait for.
     let asked = pages.subject.filtering;
-    let between = asked.then(|| between::draw(pages.subject, pages.comparison)).flatten();
+    let between = if asked { between::draw(pages.subject, pages.comparison)? } else { None };
     let between = between.map(|canvas| canvas.to_png()).transpose()?;
     let plot = plot::errors_by_level(pages.comparison)?;
     let scene = pages.reel.map(|reel| pictures::draw(reel, &pages.source.file)).transpose()?;

@@ -1,12 +1,13 @@
 //! A baked material: look-ups of its map's channels and of what it is made of.
 
 use glam::{DMat2, DVec3};
-use ndfmap_core::lookup::{Lookup, PixelFootprint, Texels};
-use ndfmap_core::ndf::{FilteredTexel, IncidentLight, LobeLayout, LocalEnvironment, Method, PreparedBrdf};
+use ndfmap_core::lookup::{Lookup, Lookups, PixelFootprint, Texels};
+use ndfmap_core::ndf::{
+    AnyMethod, FilteredTexel, IncidentLight, LobeLayout, LocalEnvironment, Method, PreparedBrdf,
+};
+use ndfmap_core::observe::{Cancelled, Observer};
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{BakedMaterial, Material, SurfaceTextures};
-
-use super::Lookups;
 
 /// What a bake makes of one material. Lights, BRDFs and models come in when shading.
 pub(super) struct Baked {
@@ -34,18 +35,18 @@ impl Baked {
     /// Bakes the map, with the finish in the lobes where the method has lobes that can carry it.
     pub(super) fn new(
         material: &Material,
-        method: &dyn Method,
+        method: &AnyMethod,
         precision: Precision,
-        progress: &(dyn Fn(f64) + Sync),
-    ) -> Self {
-        let baked = BakedMaterial::new(material, method, precision, progress);
+        observer: &dyn Observer,
+    ) -> Result<Self, Cancelled> {
+        let baked = BakedMaterial::new(material, &**method, precision, observer)?;
         let wraps = material.surface.wraps();
-        Self {
+        Ok(Self {
             map: Lookup::new(&baked.pyramid),
             layers: method.layers(),
             carriers: method.lobe_layout().filter(|_| baked.attributes > 0),
             params: baked.params.iter().map(|values| Lookup::of_values(values, wraps)).collect(),
-        }
+        })
     }
 
     /// Light that the pixel sends to the eye.
@@ -56,7 +57,7 @@ impl Baked {
         lookups: Lookups,
         (channels, lights): (&mut Vec<f32>, &[IncidentLight]),
     ) -> DVec3 {
-        let filtering = lookups.filtering;
+        let filtering = lookups.sampling.filtering();
         let mut colours = [[0.0; 4]; 2];
         for (lookup, colour) in self.params.iter().zip(&mut colours) {
             lookup.filtered(pixel, filtering, colour);

@@ -12,9 +12,10 @@ use ndfmap_core::brdf::Directions;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::environment::SceneEnvironment;
 use ndfmap_core::light::{Light, SplitSum};
-use ndfmap_core::lookup::{Filtering, PixelFootprint};
+use ndfmap_core::lookup::{Lookups, PixelFootprint};
 use ndfmap_core::metrics::Picture;
-use ndfmap_core::ndf::{IncidentLight, LocalEnvironment, Method, PreparedBrdf};
+use ndfmap_core::ndf::{AnyMethod, IncidentLight, LocalEnvironment, PreparedBrdf};
+use ndfmap_core::observe::{Cancelled, Forward, Observer};
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::scene::{Camera, Material, Rays, Scene};
 use rayon::prelude::*;
@@ -23,45 +24,33 @@ use self::baked::{Baked, Shading};
 use crate::geometry::{Geometry, Hit, Place};
 use crate::incident_directions;
 
-/// How maps are looked up.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lookups {
-    /// Width of the filter.
-    pub filtering: Filtering,
-    /// Shade every texel that the filter reads and mix the results: the reference for lobes that are not aligned, and the
-    /// only way for what cannot be filtered, which takes it unasked.
-    pub neighbours: bool,
-    /// Take factors at the lobes' means, as the papers print it.
-    pub at_means: bool,
-}
-
-impl Lookups {
-    /// One trilinear tap.
-    pub const TRILINEAR: Self = Self { filtering: Filtering::TRILINEAR, neighbours: false, at_means: false };
-}
-
 /// Parts that a pixel with an outline in it is cut into, on each axis.
 const PARTS: usize = 4;
 
 /// The maps of a scene's materials, baked with one method. Camera, lights, BRDFs, models and meshes may change after.
-pub struct BakedMaps<'a> {
-    method: &'a dyn Method,
+pub struct BakedMaps {
+    method: AnyMethod,
     materials: Vec<Baked>,
 }
 
-impl<'a> BakedMaps<'a> {
-    /// Bakes every material's map; `progress` is told the fraction done.
-    #[must_use]
+impl BakedMaps {
+    /// Bakes every material's map.
+    ///
+    /// # Errors
+    /// [`Cancelled`] by the observer.
     pub fn new(
         materials: &[Material],
-        method: &'a dyn Method,
+        method: &AnyMethod,
         precision: Precision,
-        progress: &(dyn Fn(f64) + Sync),
-    ) -> Self {
+        observer: &dyn Observer,
+    ) -> Result<Self, Cancelled> {
         let count = materials.len() as f64;
-        let bake =
-            |(i, material)| Baked::new(material, method, precision, &|f| progress((i as f64 + f) / count));
-        Self { method, materials: materials.iter().enumerate().map(bake).collect() }
+        let bake = |(i, material)| {
+            let part = observer.part(i as f64 / count, (i + 1) as f64 / count);
+            Baked::new(material, method, precision, &part)
+        };
+        let materials = materials.iter().enumerate().map(bake).collect::<Result<_, _>>()?;
+        Ok(Self { method: method.clone(), materials })
     }
 }
 
@@ -72,9 +61,7 @@ pub struct Filtered<'a> {
     /// Its triangles.
     pub geometry: &'a Geometry,
     /// Its maps.
-    pub maps: &'a BakedMaps<'a>,
-    /// Called now and then with the fraction done.
-    pub progress: &'a (dyn Fn(f64) + Sync),
+    pub maps: &'a BakedMaps,
 }
 
 /// Rows that are worked out together.
@@ -126,8 +113,17 @@ struct Scratch {
 
 impl Filtered<'_> {
     /// Renders a picture.
-    #[must_use]
-    pub fn render(&self, camera: &Camera, size: Size, lookups: Lookups) -> Picture {
+    ///
+    /// # Errors
+    /// [`Cancelled`] by the observer.
+    pub fn render(
+        &self,
+        camera: &Camera,
+        size: Size,
+        lookups: Lookups,
+        observer: &dyn Observer,
+    ) -> Result<Picture, Cancelled> {
+        let observer = Forward::new(observer);
         let rays = camera.rays(size);
         let prepare = |m: &Material| self.maps.method.prepare(&m.brdf, m.params.roughness);
         let prepared: Vec<PreparedBrdf> = self.scene.materials.iter().map(prepare).collect();
@@ -136,14 +132,15 @@ impl Filtered<'_> {
         let how = How { lookups, prepared: &prepared, around: around.as_ref() };
         let done = AtomicUsize::new(0);
         let band = |first: usize| {
+            observer.check()?;
             let band = self.band(&rays, size, first, how);
             let rows = done.fetch_add(BAND, Ordering::Relaxed) + BAND;
-            (self.progress)((rows as f64 / size.height as f64).min(1.0));
-            band
+            observer.progress((rows as f64 / size.height as f64).min(1.0));
+            Ok(band)
         };
         let bands: Vec<usize> = (0..size.height).step_by(BAND).collect();
-        let bands: Vec<Vec<Vec3>> = bands.into_par_iter().map(band).collect();
-        Grid::from_vec(size, bands.concat()).unwrap_or_else(|| unreachable!("one colour a pixel"))
+        let bands: Vec<Vec<Vec3>> = bands.into_par_iter().map(band).collect::<Result<_, Cancelled>>()?;
+        Ok(Grid::from_vec(size, bands.concat()).unwrap_or_else(|| unreachable!("one colour a pixel")))
     }
 
     /// The rows from `first` on, [`BAND`] at most.
@@ -219,7 +216,7 @@ impl Filtered<'_> {
         let pixel = PixelFootprint { uv: place.uv, duv_dx: dx * width, duv_dy: dy * width };
         let shading = Shading {
             material: &self.scene.materials[place.material],
-            method: self.maps.method,
+            method: &*self.maps.method,
             prepared: &how.prepared[place.material],
             slope_map,
             local,

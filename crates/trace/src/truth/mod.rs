@@ -14,7 +14,8 @@ use ndfmap_core::brdf::{Directions, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
 use ndfmap_core::metrics::{Picture, relative_l2};
-use ndfmap_core::scene::{Camera, Material, Rays, Scene};
+use ndfmap_core::observe::{Cancelled, Forward, Observer};
+use ndfmap_core::scene::{Camera, Effort, Material, Rays, Scene, TruePicture};
 use ndfmap_core::surface::{SurfaceRow, Wraps, normal_of_slope, slope_of_normal};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -30,28 +31,6 @@ const STRATA: usize = 4;
 
 /// Rays a pixel in the least truth: one pass for each of the two halves whose difference is the noise.
 pub const LEAST_RAYS: usize = 2 * STRATA * STRATA;
-
-/// When a truth is good enough.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Effort {
-    /// Rays a pixel, at most; rounded up to a multiple of [`LEAST_RAYS`].
-    pub rays: usize,
-    /// Stop once the noise is below this, too; 0 never does.
-    pub noise: f64,
-    /// Different seeds give independent truths.
-    pub seed: u64,
-}
-
-/// A picture by brute force.
-#[derive(Clone, Debug)]
-pub struct TruePicture {
-    /// Linear RGB.
-    pub picture: Picture,
-    /// Rays a pixel.
-    pub rays: usize,
-    /// Noise floor: relative L2 error that the picture has for want of rays, from the difference of its two halves.
-    pub noise: f64,
-}
 
 /// Normals of the finest level, and what they belong to.
 struct Finest<'a> {
@@ -119,15 +98,18 @@ impl<'a> Truth<'a> {
         Self { displacement: Some(displacement), ..Self::new(scene, geometry) }
     }
 
-    /// Renders until the effort is spent. `progress` is told the fraction done.
-    #[must_use]
+    /// Renders until the effort is spent.
+    ///
+    /// # Errors
+    /// [`Cancelled`] by the observer.
     pub fn render(
         &self,
         camera: &Camera,
         size: Size,
         effort: &Effort,
-        progress: &(dyn Fn(f64) + Sync),
-    ) -> TruePicture {
+        observer: &dyn Observer,
+    ) -> Result<TruePicture, Cancelled> {
+        let observer = Forward::new(observer);
         let rays = camera.rays(size);
         let passes = effort.rays.div_ceil(LEAST_RAYS).max(1);
         let mut halves = [vec![DVec3::ZERO; size.area()], vec![DVec3::ZERO; size.area()]];
@@ -139,7 +121,8 @@ impl<'a> Truth<'a> {
                 let whole = 2 * passes;
                 let before = 2 * done + half * more;
                 let rows = AtomicUsize::new(0);
-                sums.par_chunks_mut(size.width).enumerate().for_each(|(y, row)| {
+                sums.par_chunks_mut(size.width).enumerate().try_for_each(|(y, row)| {
+                    observer.check()?;
                     for (x, sum) in row.iter_mut().enumerate() {
                         for pass in done..done + more {
                             let stream = [effort.seed, (2 * pass + half) as u64, (y * size.width + x) as u64];
@@ -148,8 +131,9 @@ impl<'a> Truth<'a> {
                     }
                     let rows = rows.fetch_add(1, Ordering::Relaxed) + 1;
                     let part = rows as f64 / size.height as f64;
-                    progress((before as f64 + part * more as f64) / whole as f64);
-                });
+                    observer.progress((before as f64 + part * more as f64) / whole as f64);
+                    Ok(())
+                })?;
             }
             done += more;
             let scale = |sum: &DVec3, passes: usize| (*sum / (passes * STRATA * STRATA) as f64).as_vec3();
@@ -161,26 +145,30 @@ impl<'a> Truth<'a> {
             let [a, b] = [0, 1].map(|half| picture(&halves[half], done));
             let noise = relative_l2(&a, &b) / 2.0;
             if done == passes || noise <= effort.noise {
-                progress(1.0);
-                return TruePicture { picture: picture_of_all, rays: done * LEAST_RAYS, noise };
+                observer.progress(1.0);
+                return Ok(TruePicture { picture: picture_of_all, rays: done * LEAST_RAYS, noise });
             }
         }
     }
 
     /// The truth in every frame of a drift, twice, from independent rays: their mean is the truth, and half of what parts them
     /// its noise. `rays` are those of one pixel in one frame, in both together; 512 at least.
-    #[must_use]
+    ///
+    /// # Errors
+    /// [`Cancelled`] by the observer.
     pub fn drift(
         &self,
         camera: &Camera,
         size: Size,
         rays: usize,
-        progress: &(dyn Fn(f64) + Sync),
-    ) -> [Vec<Picture>; 2] {
+        observer: &dyn Observer,
+    ) -> Result<[Vec<Picture>; 2], Cancelled> {
+        let observer = Forward::new(observer);
         let cell_rays = drift::cell_camera(camera, size).rays(drift::cells(size));
         let each = rays.div_ceil(2 * drift::CELLS).max(1);
         let done = AtomicUsize::new(0);
         let band = |half: u64, first: usize| {
+            observer.check()?;
             let rows = drift::BAND.min(size.height - first);
             let part = Size { height: rows, ..size };
             let Size { width, height } = drift::cells(part);
@@ -196,16 +184,18 @@ impl<'a> Truth<'a> {
             };
             let cells: Vec<DVec3> = (0..width * height).map(cell).collect();
             let rows = done.fetch_add(rows, Ordering::Relaxed) + rows;
-            progress(rows as f64 / (2 * size.height) as f64);
-            drift::frames(&cells, part)
+            observer.progress(rows as f64 / (2 * size.height) as f64);
+            Ok(drift::frames(&cells, part))
         };
         let firsts: Vec<usize> = (0..size.height).step_by(drift::BAND).collect();
-        [0, 1].map(|half| {
-            let bands: Vec<Vec<Picture>> = firsts.par_iter().map(|first| band(half, *first)).collect();
+        let half = |half: u64| {
+            let bands: Vec<Vec<Picture>> =
+                firsts.par_iter().map(|first| band(half, *first)).collect::<Result<_, Cancelled>>()?;
             let row = |frame: usize, y: usize| bands[y / drift::BAND][frame].row(y % drift::BAND);
             let frame = |frame| Grid::from_fn(size, |x, y| row(frame, y)[x]);
-            (0..drift::DRIFT_FRAMES).map(frame).collect()
-        })
+            Ok((0..drift::DRIFT_FRAMES).map(frame).collect())
+        };
+        Ok([half(0)?, half(1)?])
     }
 
     /// Sum over one ray through each stratum of a pixel.

@@ -8,16 +8,18 @@ use glam::{DVec3, Vec3};
 use ndfmap_core::brdf::{AnyLobe, Brdf, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::Size;
 use ndfmap_core::light::Light;
+use ndfmap_core::lookup::Lookups;
 use ndfmap_core::metrics::Picture;
 use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::observe::Unobserved;
 use ndfmap_core::procedural;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{Camera, Material, Mesh, Object, Scene};
+use ndfmap_core::scene::{Camera, Effort, Material, Mesh, Object, Scene, TruePicture};
 use ndfmap_core::surface::Surface;
 use ndfmap_core::units::SlopeVariance;
 use ndfmap_trace::Geometry;
-use ndfmap_trace::filtered::{BakedMaps, Filtered, Lookups};
-use ndfmap_trace::truth::{Effort, TruePicture, Truth};
+use ndfmap_trace::filtered::{BakedMaps, Filtered};
+use ndfmap_trace::truth::Truth;
 
 pub(crate) const SQUARE: Size = Size { width: 4, height: 4 };
 
@@ -57,16 +59,16 @@ pub(crate) fn plate(surface: Arc<dyn Surface>, lobe: &str, shading: ShadingModel
 
 pub(crate) fn truth(scene: &Scene, size: Size, rays: usize, seed: u64) -> TruePicture {
     let geometry = Geometry::new(scene);
-    Truth::new(scene, &geometry).render(&scene.camera, size, &Effort { rays, noise: 0.0, seed }, &|_| ())
+    Truth::new(scene, &geometry)
+        .render(&scene.camera, size, &Effort { rays, noise: 0.0, seed }, &|_| ())
+        .unwrap()
 }
 
 pub(crate) fn filtered(scene: &Scene, method: &str, size: Size, lookups: Lookups) -> Picture {
     let geometry = Geometry::new(scene);
     let method = method.parse::<AnyMethod>().unwrap();
-    let maps = BakedMaps::new(&scene.materials, &*method, Precision::Single, &|_| ());
-    Filtered { scene, geometry: &geometry, maps: &maps, progress: &|_| () }.render(
-        &scene.camera,
-        size,
-        lookups,
-    )
+    let maps = BakedMaps::new(&scene.materials, &method, Precision::Single, &|_| ()).unwrap();
+    Filtered { scene, geometry: &geometry, maps: &maps }
+        .render(&scene.camera, size, lookups, &Unobserved)
+        .unwrap()
 }

@@ -1,0 +1,126 @@
+//! Observers of long work: who is told how far it is, and who may stop it.
+
+use std::sync::{Mutex, PoisonError};
+
+/// Observer of a piece of work. A closure that takes the fraction done is one that never stops it.
+pub trait Observer: Sync {
+    /// Told the fraction done, from 0 to 1, by any thread and never less than before.
+    fn progress(&self, _fraction: f64) {}
+
+    /// Asked now and then, by any thread; once true, the work ends as soon as it can, with [`Cancelled`].
+    fn cancelled(&self) -> bool {
+        false
+    }
+
+    /// [`Self::cancelled`] as a result, for `?`.
+    ///
+    /// # Errors
+    /// [`Cancelled`], where the observer wants the work to end.
+    fn check(&self) -> Result<(), Cancelled> {
+        if self.cancelled() { Err(Cancelled) } else { Ok(()) }
+    }
+}
+
+impl<F: Fn(f64) + Sync> Observer for F {
+    fn progress(&self, fraction: f64) {
+        self(fraction);
+    }
+}
+
+/// Observer that looks away.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Unobserved;
+
+impl Observer for Unobserved {}
+
+/// Work that its observer stopped; nothing of it is left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("cancelled")]
+pub struct Cancelled;
+
+impl dyn Observer + '_ {
+    /// Observer of a part of the work, which goes from one fraction of the whole to another.
+    pub fn part(&self, from: f64, to: f64) -> Part<'_> {
+        Part { whole: self, from, to }
+    }
+}
+
+/// Observer of a part, made by [`part`](trait.Observer.html#method.part).
+#[derive(Clone, Copy)]
+pub struct Part<'a> {
+    whole: &'a dyn Observer,
+    from: f64,
+    to: f64,
+}
+
+impl Observer for Part<'_> {
+    fn progress(&self, fraction: f64) {
+        self.whole.progress(self.from + (self.to - self.from) * fraction);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.whole.cancelled()
+    }
+}
+
+/// Observer that hands on what its threads report, and nothing that runs backwards.
+pub struct Forward<'a> {
+    observer: &'a dyn Observer,
+    most: Mutex<f64>,
+}
+
+impl<'a> Forward<'a> {
+    /// Nothing done.
+    #[must_use]
+    pub fn new(observer: &'a dyn Observer) -> Self {
+        Self { observer, most: Mutex::new(f64::NEG_INFINITY) }
+    }
+}
+
+impl Observer for Forward<'_> {
+    fn progress(&self, fraction: f64) {
+        // Held while it is told, so that no other thread tells less after it.
+        let mut most = self.most.lock().unwrap_or_else(PoisonError::into_inner);
+        if fraction > *most {
+            *most = fraction;
+            self.observer.progress(fraction);
+        }
+    }
+
+    fn cancelled(&self) -> bool {
+        self.observer.cancelled()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn progress_never_runs_backwards() {
+        let told = Mutex::new(Vec::new());
+        let observer = |fraction: f64| told.lock().unwrap().push(fraction);
+        let forward = Forward::new(&observer);
+        [0.1, 0.3, 0.2, 0.3, 0.9].iter().for_each(|fraction| forward.progress(*fraction));
+        assert_eq!(*told.lock().unwrap(), [0.1, 0.3, 0.9]);
+    }
+
+    #[test]
+    fn a_part_is_a_share_of_the_whole_and_ends_with_it() {
+        struct Stopped(Mutex<f64>);
+        impl Observer for Stopped {
+            fn progress(&self, fraction: f64) {
+                *self.0.lock().unwrap() = fraction;
+            }
+            fn cancelled(&self) -> bool {
+                true
+            }
+        }
+        let stopped = Stopped(Mutex::new(0.0));
+        let whole: &dyn Observer = &stopped;
+        let part = whole.part(0.5, 0.75);
+        part.progress(0.5);
+        assert_eq!(*stopped.0.lock().unwrap(), 0.625);
+        assert_eq!(part.check(), Err(Cancelled));
+    }
+}
