@@ -6,23 +6,24 @@
 //! ```
 //! use glam::DVec3;
 //! use ndfmap_core::bake::Bake;
-//! use ndfmap_core::pyramid::Precision;
-//! use ndfmap_core::{brdf, grid::Size, ndf, procedural};
+//! use ndfmap_core::brdf::{Ggx, Lobe};
+//! use ndfmap_core::ndf::{Method, Slopes};
+//! use ndfmap_core::units::Alpha;
+//! use ndfmap_core::{grid::Size, procedural};
 //!
 //! // A surface: here a built-in one, elsewhere a normal or height map.
 //! let surface = (procedural::find("v-groove").unwrap().build)(Size::new(64, 64)?);
 //! // Bake it into every level of a representation of your choice ...
-//! let method = "slopes".parse::<AnyMethod>()?;
-//! let bake = Bake::new(&*surface, &*method);
-//! let (pyramid, _) = bake.to_pyramid()?;
+//! let method = Slopes::new();
+//! let (pyramid, _) = Bake::new(&*surface, &method).to_pyramid()?;
 //! // ... and shade the coarsest texel with any BRDF, chosen now and not when baking.
-//! let brdf = "ggx:0.2".parse::<AnyLobe>()?;
+//! let lobe = Ggx::new(Alpha::new(0.2)?);
 //! let straight_up = [DVec3::Z];
 //! let mut reflected = [0.0];
 //! let last = pyramid.sizes().len() - 1;
-//! method.evaluator(&*brdf, &straight_up).evaluate(&pyramid.texel(last, 0, 0), &mut reflected);
+//! Method::evaluator(&method, &lobe, &straight_up).evaluate(&pyramid.texel(last, 0, 0), &mut reflected);
 //! // Both flanks of the groove lean away: far less light comes straight back than from a flat patch.
-//! assert!(reflected[0] < 0.3 * brdf.evaluate(1.0));
+//! assert!(reflected[0] < 0.3 * lobe.evaluate(1.0));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

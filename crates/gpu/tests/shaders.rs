@@ -15,7 +15,7 @@ fn every_link_is_valid() {
         link::truth(&*lobe).unwrap_or_else(|e| panic!("{}: {e}", row.name));
         for spelling in ndf::TABLE.iter().flat_map(|row| row.samples) {
             let method = spelling.parse::<AnyMethod>().unwrap();
-            let carried = if method.fit().is_some() { 0..=2 } else { 0..=0 };
+            let carried = if method.carries_attributes() { 0..=2 } else { 0..=0 };
             for attributes in carried {
                 link::draw(&*method, &*lobe, attributes).unwrap_or_else(|e| panic!("{spelling}: {e}"));
                 links += 1;
