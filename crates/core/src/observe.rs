@@ -4,6 +4,12 @@ use std::sync::{Mutex, PoisonError};
 
 /// Observer of a piece of work. A closure that takes the fraction done is one that never stops it.
 pub trait Observer: Sync {
+    /// Told that another piece of the work begins, in words such as `bake vmf:4`; progress counts from 0 again.
+    fn begin(&self, _work: &str) {}
+
+    /// Told what a person may want to know, in a sentence without a full stop.
+    fn note(&self, _note: &str) {}
+
     /// Told the fraction done, from 0 to 1, by any thread and never less than before.
     fn progress(&self, _fraction: f64) {}
 
@@ -54,6 +60,14 @@ pub struct Part<'a> {
 }
 
 impl Observer for Part<'_> {
+    fn begin(&self, work: &str) {
+        self.whole.begin(work);
+    }
+
+    fn note(&self, note: &str) {
+        self.whole.note(note);
+    }
+
     fn progress(&self, fraction: f64) {
         self.whole.progress(self.from + (self.to - self.from) * fraction);
     }
@@ -78,6 +92,15 @@ impl<'a> Forward<'a> {
 }
 
 impl Observer for Forward<'_> {
+    fn begin(&self, work: &str) {
+        *self.most.lock().unwrap_or_else(PoisonError::into_inner) = f64::NEG_INFINITY;
+        self.observer.begin(work);
+    }
+
+    fn note(&self, note: &str) {
+        self.observer.note(note);
+    }
+
     fn progress(&self, fraction: f64) {
         // Held while it is told, so that no other thread tells less after it.
         let mut most = self.most.lock().unwrap_or_else(PoisonError::into_inner);

@@ -177,6 +177,13 @@ impl Pyramid {
         Ok(Self { layers: layout.layers, precision: layout.precision, wraps: layout.wraps, sizes, levels })
     }
 
+    /// Size of the finest level, layers, precision and wraps.
+    #[must_use]
+    pub fn layout(&self) -> Layout {
+        let size = self.sizes.first().copied().unwrap_or(Size { width: 0, height: 0 });
+        Layout { size, layers: self.layers, precision: self.precision, wraps: self.wraps }
+    }
+
     /// Sizes of the levels, finest first.
     #[must_use]
     pub fn sizes(&self) -> &[Size] {

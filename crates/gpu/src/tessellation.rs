@@ -12,9 +12,7 @@ use ndfmap_core::surface::Wrap;
 
 use crate::geometry::{Corner, Geometry, Part, Triangle, corner, triangle};
 use crate::{Device, GpuError};
-
-/// The twin of core's tessellation.
-const TWIN: &str = include_str!("../../core/src/scene/tessellation.wgsl");
+use ndfmap_core::shader::TESSELLATION;
 
 /// What both passes share.
 const HEIGHTS: &str =
@@ -95,8 +93,10 @@ impl<'a> Meshes<'a> {
             device: device.clone(),
             scene,
             bases: scene.objects.iter().enumerate().map(base).collect::<Result<_, GpuError>>()?,
-            points: device.compute_pipeline(&[TWIN, HEIGHTS, include_str!("passes/points.wgsl")].join("\n")),
-            facets: device.compute_pipeline(&[TWIN, HEIGHTS, include_str!("passes/facets.wgsl")].join("\n")),
+            points: device
+                .compute_pipeline(&[TESSELLATION, HEIGHTS, include_str!("passes/points.wgsl")].join("\n")),
+            facets: device
+                .compute_pipeline(&[TESSELLATION, HEIGHTS, include_str!("passes/facets.wgsl")].join("\n")),
             middle,
             radius,
         })

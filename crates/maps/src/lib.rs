@@ -18,6 +18,7 @@ pub mod picture;
 pub mod source;
 
 pub use error::MapError;
+pub use formats::{ChannelLayout, WriteOptions};
 pub use header::{Attribute, Header, Source, SourceKind, VERSION};
 pub use image::{Image, MAX_SIDE, MAX_TEXELS, Samples};
-pub use ndf_map::{MAX_ATTRIBUTES, NdfMap};
+pub use ndf_map::{MAX_ATTRIBUTES, NdfMap, NdfTexel};

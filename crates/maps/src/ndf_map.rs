@@ -2,11 +2,15 @@
 
 use std::path::Path;
 
+use glam::DVec3;
+use ndfmap_core::brdf::{Brdf, SurfaceParams};
+use ndfmap_core::lookup::{Filtering, PixelFootprint, Texels};
+use ndfmap_core::ndf::{AnyMethod, Decoded, FilteredTexel, IncidentLight};
 use ndfmap_core::pyramid::{Layout, Precision, Pyramid};
 
+use crate::formats::{WriteOptions, read_file, read_ndf, to_write};
 use crate::image::check_size;
 use crate::{Header, MapError};
-use ndfmap_core::ndf::AnyMethod;
 
 /// A normal distribution map.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,12 +22,50 @@ pub struct NdfMap {
 }
 
 impl NdfMap {
+    /// Reads a baked map.
+    ///
+    /// # Errors
+    /// [`MapError`] for a file that cannot be read, is damaged, or holds a plain picture.
+    pub fn open(path: &Path) -> Result<Self, MapError> {
+        let plain = || MapError::unsupported(path, "is a plain picture, no baked map");
+        read_ndf(path, &read_file(path)?)?.ok_or_else(plain)
+    }
+
+    /// Writes the map to a file, whole or not at all, in the format that its name asks for; returns its length in bytes.
+    ///
+    /// # Errors
+    /// [`MapError`] for a name or options that no format has, and for a file that cannot be written.
+    pub fn save(&self, path: &Path, options: &WriteOptions) -> Result<u64, MapError> {
+        match to_write(path)?.write_ndf {
+            Some(write) => write(path, self, options),
+            None => unreachable!("formats to write have a writer"),
+        }
+    }
+
     /// The method that decodes it.
     ///
     /// # Errors
-    /// [`MapError`] when the header names none.
+    /// [`MapError`] when the header names none; `path` is for its words.
     pub fn method(&self, path: &Path) -> Result<AnyMethod, MapError> {
         method_of(path, &self.header)
+    }
+
+    /// A texel as it is stored; `None` beyond the map, or where the header names no method.
+    #[must_use]
+    pub fn texel(&self, level: usize, x: usize, y: usize) -> Option<NdfTexel> {
+        let size = self.pyramid.sizes().get(level).filter(|size| x < size.width && y < size.height)?;
+        debug_assert!(size.area() > 0, "a level has texels");
+        let method = self.header.method.parse().ok()?;
+        Some(NdfTexel { method, channels: self.pyramid.texel(level, x, y) })
+    }
+
+    /// What a pixel sees: the texels that it falls on, filtered; `None` where the header names no method.
+    #[must_use]
+    pub fn filtered(&self, pixel: &PixelFootprint, filtering: Filtering) -> Option<NdfTexel> {
+        let method: AnyMethod = self.header.method.parse().ok()?;
+        let mut channels = vec![0.0; self.pyramid.channels()];
+        self.pyramid.filtered(pixel, filtering, &mut channels);
+        Some(NdfTexel { method, channels })
     }
 
     /// Puts a map together from a file's parts, checking that they agree.
@@ -36,6 +78,47 @@ impl NdfMap {
         let layout = layout_of(path, &header, precision)?;
         let pyramid = Pyramid::new(layout, levels).map_err(|e| MapError::invalid(path, e))?;
         Ok(Self { header, pyramid })
+    }
+}
+
+/// A texel of a map, stored or filtered.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NdfTexel {
+    /// The method that reads it.
+    pub method: AnyMethod,
+    /// Channels, four a layer, those of attributes last.
+    pub channels: Vec<f32>,
+}
+
+impl NdfTexel {
+    /// Channels of the method itself, without those of attributes.
+    fn own(&self) -> &[f32] {
+        &self.channels[..4 * self.method.layers()]
+    }
+
+    /// The distribution of normals that it stands for.
+    #[must_use]
+    pub fn decoded(&self) -> Decoded {
+        self.method.describe(self.own())
+    }
+
+    /// Value of an attribute that a lobe carries; `None` where there is none.
+    #[must_use]
+    pub fn attribute(&self, attribute: usize, lobe: usize) -> Option<[f32; 4]> {
+        self.method.lobe_layout()?.attribute(&self.channels, attribute, lobe)
+    }
+
+    /// Light that it sends to the eye, linear RGB: every normal of it lit by every light. The material is all of one colour and roughness.
+    #[must_use]
+    pub fn shade(&self, brdf: &Brdf, params: &SurfaceParams, lights: &[IncidentLight]) -> DVec3 {
+        let texel = FilteredTexel {
+            channels: self.own(),
+            params: &|_| *params,
+            prepared: &self.method.prepare(brdf, params.roughness),
+            at_means: false,
+            slope_map: None,
+        };
+        self.method.reflect(&texel, lights)
     }
 }
 

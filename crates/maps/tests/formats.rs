@@ -9,13 +9,11 @@ use std::path::Path;
 use common::{HEIGHT, WIDTH, baked, pictures, png, rgb8};
 use ndfmap_core::bake::{LevelSink, Place};
 use ndfmap_core::grid::Size;
-use ndfmap_core::pyramid::{Layout, Precision};
+use ndfmap_core::pyramid::Precision;
 use ndfmap_core::surface::{Surface, SurfaceRow};
-use ndfmap_maps::formats::exr::{write_bumpslopes, write_native};
-use ndfmap_maps::formats::ktx2::{Ktx2Sink, write_compressed};
-use ndfmap_maps::formats::{read_file, read_image, read_ndf};
+use ndfmap_maps::formats::{read_file, read_image, read_ndf, to_write};
 use ndfmap_maps::source::{SourceMap, SourceOptions, read_source, source_of_image};
-use ndfmap_maps::{NdfMap, SourceKind};
+use ndfmap_maps::{ChannelLayout, NdfMap, SourceKind, WriteOptions};
 
 fn source(name: &str, bytes: &[u8], options: &SourceOptions) -> SourceMap {
     let path = Path::new(name);
@@ -123,19 +121,18 @@ fn missing_files_folders_and_strangers_are_named() {
     assert!(error(&other).contains("is of no known format; known are PNG, JPEG"));
 }
 
-fn write_ktx2(path: &Path, map: &NdfMap) {
+/// Row by row, as a bake does it.
+fn write_in_rows(path: &Path, map: &NdfMap) -> u64 {
     let p = &map.pyramid;
-    let layout =
-        Layout { size: p.sizes()[0], layers: p.layers(), precision: p.precision(), wraps: p.wraps() };
-    let mut sink = Ktx2Sink::create(path, &map.header, layout).unwrap();
+    let open = to_write(path).unwrap().open_sink.unwrap();
+    let mut sink = open(path, &map.header, p.layout()).unwrap();
     for level in 0..p.sizes().len() {
         let layers = p.level_bytes(level).chunks_exact(p.level_bytes(level).len() / p.layers());
         for (layer, bytes) in layers.enumerate() {
             sink.write_rows(Place { level, layer, row: 0 }, bytes).unwrap();
         }
     }
-    let length = sink.finish().unwrap();
-    assert_eq!(length, std::fs::metadata(path).unwrap().len());
+    sink.finish().unwrap()
 }
 
 #[test]
@@ -144,16 +141,14 @@ fn baked_maps_come_back_bit_for_bit() {
     for method in ndfmap_core::ndf::TABLE.iter().map(|row| row.samples[0]) {
         for precision in [Precision::Half, Precision::Single] {
             let map = baked(method, "foil", precision);
-            for name in ["map.ktx2", "small.ktx2", "map.exr"] {
+            for name in ["rows.ktx2", "map.ktx2", "small.ktx2", "map.exr"] {
                 let path = folder.path().join(name);
-                match name {
-                    "map.ktx2" => write_ktx2(&path, &map),
-                    "small.ktx2" => {
-                        let length = write_compressed(&path, &map, 5).unwrap();
-                        assert_eq!(length, std::fs::metadata(&path).unwrap().len());
-                    }
-                    _ => assert!(write_native(&path, &map).unwrap() > 0),
-                }
+                let zstd = (name == "small.ktx2").then_some(5);
+                let length = match name {
+                    "rows.ktx2" => write_in_rows(&path, &map),
+                    _ => map.save(&path, &WriteOptions { zstd, ..WriteOptions::default() }).unwrap(),
+                };
+                assert_eq!(length, std::fs::metadata(&path).unwrap().len(), "{name}");
                 let back = read_ndf(&path, &read_file(&path).unwrap()).unwrap().unwrap();
                 assert!(back == map, "{method} {precision:?} {name}");
             }
@@ -168,9 +163,29 @@ fn attributes_that_do_not_fit_the_method_are_refused() {
     let mut map = baked("slopes", "foil", Precision::Half);
     map.header.attributes =
         vec![ndfmap_maps::Attribute { name: "a.png".to_owned(), channels: 1, transfer: "linear".to_owned() }];
-    write_compressed(&path, &map, 1).unwrap();
+    map.save(&path, &WriteOptions::default()).unwrap();
     let error = read_ndf(&path, &read_file(&path).unwrap()).unwrap_err().to_string();
     assert!(error.ends_with("says that `slopes` carries 1 attributes"), "{error}");
+}
+
+/// OpenImageIO's channels, in the map's own precision.
+const BUMPSLOPES: WriteOptions =
+    WriteOptions { zstd: None, channels: ChannelLayout::Bumpslopes, precision: None };
+
+#[test]
+fn options_that_a_format_has_not_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = baked("slopes", "foil", Precision::Half);
+    let refused = |name: &str, options: &WriteOptions| {
+        let path = folder.path().join(name);
+        let error = map.save(&path, options).unwrap_err().to_string();
+        assert!(!path.exists(), "{name}");
+        error
+    };
+    let zstd = WriteOptions { zstd: Some(3), ..WriteOptions::default() };
+    assert!(refused("a.exr", &zstd).contains("Zstandard is for KTX2"));
+    assert!(refused("a.ktx2", &BUMPSLOPES).contains("ending in .exr"));
+    assert!(refused("a.png", &WriteOptions::default()).ends_with("maps are written as .exr or .ktx2"));
 }
 
 #[test]
@@ -179,7 +194,7 @@ fn bumpslopes_come_back_for_heights_and_normals() {
     let path = folder.path().join("b.exr");
     for builtin in ["armour", "v-groove"] {
         let map = baked("slopes", builtin, Precision::Single);
-        write_bumpslopes(&path, &map, map.pyramid.precision()).unwrap();
+        map.save(&path, &BUMPSLOPES).unwrap();
         let back = read_ndf(&path, &read_file(&path).unwrap()).unwrap().unwrap();
         assert_eq!(back.header, map.header);
         for (level, size) in map.pyramid.sizes().iter().enumerate() {
@@ -193,6 +208,6 @@ fn bumpslopes_come_back_for_heights_and_normals() {
         }
     }
     let naive = baked("naive", "armour", Precision::Half);
-    let error = write_bumpslopes(&path, &naive, Precision::Half).unwrap_err().to_string();
+    let error = naive.save(&path, &BUMPSLOPES).unwrap_err().to_string();
     assert!(error.ends_with("holds the method `slopes`, not `naive`"));
 }

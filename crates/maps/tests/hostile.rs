@@ -11,9 +11,8 @@ use std::path::Path;
 use common::{baked, pictures};
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_maps::formats::exr::{write_bumpslopes, write_native};
-use ndfmap_maps::formats::ktx2::write_compressed;
-use ndfmap_maps::formats::{read_image, read_ndf};
+use ndfmap_maps::formats::{read_image, read_ndf, to_write};
+use ndfmap_maps::{ChannelLayout, WriteOptions};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -23,20 +22,21 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
     let mut all = pictures();
     let map = baked("slopes", "armour", Precision::Half);
     let path = folder.path().join("map.exr");
-    write_native(&path, &map).unwrap();
+    map.save(&path, &WriteOptions::default()).unwrap();
     all.push(("native.exr", std::fs::read(&path).unwrap()));
-    write_bumpslopes(&path, &map, map.pyramid.precision()).unwrap();
+    let bumpslopes = WriteOptions { channels: ChannelLayout::Bumpslopes, ..WriteOptions::default() };
+    map.save(&path, &bumpslopes).unwrap();
     all.push(("bumpslopes.exr", std::fs::read(&path).unwrap()));
     all.push(("map.ktx2", ktx2()));
     let path = folder.path().join("small.ktx2");
-    write_compressed(&path, &baked("vmf:2", "armour", Precision::Half), 3).unwrap();
+    let compressed = WriteOptions { zstd: Some(3), ..WriteOptions::default() };
+    baked("vmf:2", "armour", Precision::Half).save(&path, &compressed).unwrap();
     all.push(("zstd.ktx2", std::fs::read(&path).unwrap()));
     all
 }
 
 fn ktx2() -> Vec<u8> {
     use ndfmap_core::bake::Bake;
-    use ndfmap_maps::formats::ktx2::Ktx2Sink;
     use ndfmap_maps::source::{SourceOptions, read_source};
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("map.ktx2");
@@ -48,7 +48,8 @@ fn ktx2() -> Vec<u8> {
     let method = "slopes".parse::<AnyMethod>().unwrap();
     let bake = Bake::new(&*map.surface, &*method);
     let header = baked("slopes", "armour", Precision::Half).header;
-    let mut sink = Ktx2Sink::create(&path, &header, bake.layout()).unwrap();
+    let open = to_write(&path).unwrap().open_sink.unwrap();
+    let mut sink = open(&path, &header, bake.layout()).unwrap();
     bake.run(&mut sink).unwrap();
     sink.finish().unwrap();
     std::fs::read(&path).unwrap()

@@ -1,7 +1,22 @@
-//! ndfmap: the program, and the library's front door.
+//! ndfmap: normal distribution maps from files to pictures, all that the program `ndfmap` does, by typed functions.
 //!
-//! Library users need [`core`] (mathematics), [`maps`] (files) and perhaps [`trace`] (pictures) and `gpu` (the same in real time) only; the rest of this crate is the
-//! program: its commands, how they measure, and how they draw.
+//! - [`maps`] reads sources and baked maps; [`BakeJob`] bakes one into the other, and [`choose`] finds the method for a map.
+//! - [`compare`] measures methods on a map, [`render`] renders scenes through baked maps and by brute force, [`report`] draws both.
+//! - [`core`] has the mathematics, [`trace`] the CPU renderer, and `gpu` (a feature) the same in real time, and shaders for other programs.
+//!
+//! Long work takes an [`Observer`](core::observe::Observer), who is told how far it is and may stop it.
+//!
+//! ```no_run
+//! use ndfmap::BakeJob;
+//! use ndfmap::core::ndf::Vmf;
+//! use ndfmap::maps::WriteOptions;
+//! use ndfmap::maps::source::{SourceOptions, read_source};
+//!
+//! let map = read_source("bricks_normal.png".as_ref(), &SourceOptions::default())?;
+//! let report = BakeJob::new(&map, Vmf::new(4)?).save("bricks.ktx2".as_ref(), &WriteOptions::default())?;
+//! println!("{} levels, {} bytes", report.levels, report.bytes);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub use ndfmap_core as core;
 #[cfg(feature = "gpu")]
@@ -9,16 +24,17 @@ pub use ndfmap_gpu as gpu;
 pub use ndfmap_maps as maps;
 pub use ndfmap_trace as trace;
 
-mod auto;
-pub mod commands;
-mod engine;
-mod fail;
-mod imaging;
-mod interrupt;
-mod measure;
-mod progress;
-mod report;
-mod staging;
+mod bake;
+pub mod choose;
+pub mod compare;
+mod device;
+mod error;
+pub mod inspect;
+pub mod render;
+pub mod report;
+mod scene_spec;
 
-pub use fail::Failure;
-pub use interrupt::clean_up_when_interrupted;
+pub use bake::{BakeJob, BakeReport, BakeSeconds};
+pub use device::DeviceReport;
+pub use error::Error;
+pub use scene_spec::{CameraSpec, DisplacementOptions, RotatingEnvironment, SceneSpec};

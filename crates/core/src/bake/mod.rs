@@ -52,6 +52,18 @@ pub trait LevelSink {
     }
 }
 
+impl<S: LevelSink + ?Sized> LevelSink for Box<S> {
+    type Error = S::Error;
+
+    fn write_rows(&mut self, place: Place, bytes: &[u8]) -> Result<(), Self::Error> {
+        (**self).write_rows(place, bytes)
+    }
+
+    fn memory(&mut self) -> Option<&mut [Vec<u8>]> {
+        (**self).memory()
+    }
+}
+
 /// Bake of a surface by a method: put together, then [run](Bake::run) into a sink or [into memory](Bake::to_pyramid).
 ///
 /// ```

@@ -19,7 +19,7 @@ use ::exr::prelude::{
 use ndfmap_core::grid::Size;
 use ndfmap_core::pyramid::{Precision, Pyramid, level_sizes};
 
-use super::Format;
+use super::{ChannelLayout, Format, WriteOptions};
 use crate::atomic::AtomicFile;
 use crate::header::{Source, SourceKind, VERSION};
 use crate::image::{MAX_TEXELS, check_size};
@@ -31,6 +31,8 @@ pub(super) const FORMAT: Format = Format {
     magic: &[b"\x76\x2f\x31\x01"],
     read_image: Some(read_image),
     read_ndf: Some(read_ndf),
+    write_ndf: Some(write_ndf),
+    ..Format::READ_ONLY
 };
 
 /// The attribute that holds our [`Header`].
@@ -309,11 +311,21 @@ fn read_bumpslopes(
     NdfMap::assemble(path, header, precision, levels)
 }
 
+/// Writes a map in either layout of channels.
+fn write_ndf(path: &Path, map: &NdfMap, options: &WriteOptions) -> Result<u64, MapError> {
+    if options.zstd.is_some() {
+        return Err(MapError::unsupported(path, "Zstandard is for KTX2; an OpenEXR is compressed as it is"));
+    }
+    match options.channels {
+        ChannelLayout::Native => write_native(path, map),
+        ChannelLayout::Bumpslopes => {
+            write_bumpslopes(path, map, options.precision.unwrap_or(map.pyramid.precision()))
+        }
+    }
+}
+
 /// Writes the native layout; returns the file's length.
-///
-/// # Errors
-/// [`MapError`] when the file cannot be written.
-pub fn write_native(path: &Path, map: &NdfMap) -> Result<u64, MapError> {
+fn write_native(path: &Path, map: &NdfMap) -> Result<u64, MapError> {
     let pyramid = &map.pyramid;
     let layers = (0..pyramid.layers()).map(|layer| {
         let levels = |channel: usize| {
@@ -328,11 +340,8 @@ pub fn write_native(path: &Path, map: &NdfMap) -> Result<u64, MapError> {
 
 /// Writes OpenImageIO's six channels in this precision; returns the file's length.
 ///
-/// Heights change their units on the way, so give a map in single precision to have them rounded once.
-///
-/// # Errors
-/// [`MapError`] when the map's method is not `slopes` or the file cannot be written.
-pub fn write_bumpslopes(path: &Path, map: &NdfMap, precision: Precision) -> Result<u64, MapError> {
+/// Heights change their units on the way, so a map in single precision has them rounded once.
+fn write_bumpslopes(path: &Path, map: &NdfMap, precision: Precision) -> Result<u64, MapError> {
     if map.header.method != "slopes" {
         let reason = format!("the bumpslopes layout holds the method `slopes`, not `{}`", map.header.method);
         return Err(MapError::unsupported(path, reason));

@@ -16,7 +16,7 @@ pub(super) const FORMAT: Format = Format {
     extensions: &["hdr", "pic"],
     magic: &[b"#?RADIANCE", b"#?RGBE"],
     read_image: Some(read),
-    read_ndf: None,
+    ..Format::READ_ONLY
 };
 
 fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {

@@ -16,7 +16,7 @@ pub(super) const FORMAT: Format = Format {
     extensions: &["jpg", "jpeg"],
     magic: &[b"\xFF\xD8\xFF"],
     read_image: Some(read),
-    read_ndf: None,
+    ..Format::READ_ONLY
 };
 
 fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {

@@ -16,7 +16,7 @@ use ndfmap_core::bake::{LevelSink, Place};
 use ndfmap_core::grid::Size;
 use ndfmap_core::pyramid::{Layout, Precision, level_sizes};
 
-use super::Format;
+use super::{ChannelLayout, Format, NdfSink, WriteOptions};
 use crate::atomic::AtomicFile;
 use crate::ndf_map::layout_of;
 use crate::{Header, MapError, NdfMap};
@@ -25,8 +25,10 @@ pub(super) const FORMAT: Format = Format {
     name: "KTX2",
     extensions: &["ktx2"],
     magic: &[&MAGIC],
-    read_image: None,
     read_ndf: Some(read_ndf),
+    write_ndf: Some(write_ndf),
+    open_sink: Some(|path, header, layout| Ok(Box::new(Ktx2Sink::create(path, header, layout)?))),
+    ..Format::READ_ONLY
 };
 
 /// The key that holds our [`Header`].
@@ -129,17 +131,32 @@ fn level_bytes(layout: &Layout, size: Size) -> u64 {
     (layout.layer_bytes(size) * layout.layers) as u64
 }
 
+/// Writes a map, compressed or plain.
+fn write_ndf(path: &Path, map: &NdfMap, options: &WriteOptions) -> Result<u64, MapError> {
+    if options.channels != ChannelLayout::Native {
+        return Err(MapError::unsupported(path, "the bumpslopes layout needs an output ending in .exr"));
+    }
+    if let Some(level) = options.zstd {
+        return write_compressed(path, map, level);
+    }
+    let mut sink = Ktx2Sink::create(path, &map.header, map.pyramid.layout())?;
+    let (sizes, layers) = (map.pyramid.sizes(), map.pyramid.layers());
+    for level in 0..sizes.len() {
+        let bytes = map.pyramid.level_bytes(level);
+        for (layer, bytes) in bytes.chunks_exact(bytes.len() / layers).enumerate() {
+            sink.write_rows(Place { level, layer, row: 0 }, bytes)?;
+        }
+    }
+    sink.complete()
+}
+
 /// Writes a map with Zstandard supercompression, at a level from 1 (fast) to 22; returns the file's length.
 ///
 /// Every compression level's bytes are the same for any number of threads: the library cuts its jobs by size.
-///
-/// # Errors
-/// [`MapError`] when the file cannot be written.
-pub fn write_compressed(path: &Path, map: &NdfMap, level: i32) -> Result<u64, MapError> {
+fn write_compressed(path: &Path, map: &NdfMap, level: i32) -> Result<u64, MapError> {
     let io = |e| MapError::io(path, e);
     let p = &map.pyramid;
-    let layout =
-        Layout { size: p.sizes()[0], layers: p.layers(), precision: p.precision(), wraps: p.wraps() };
+    let layout = p.layout();
     let mut compressor = zstd::bulk::Compressor::new(level).map_err(io)?;
     compressor.multithread(rayon::current_num_threads().max(1) as u32).map_err(io)?;
     let compressed: Result<Vec<Vec<u8>>, _> =
@@ -159,7 +176,7 @@ pub fn write_compressed(path: &Path, map: &NdfMap, level: i32) -> Result<u64, Ma
 
 /// Writes a KTX2 file while its levels are being baked.
 #[derive(Debug)]
-pub struct Ktx2Sink {
+struct Ktx2Sink {
     file: AtomicFile,
     layout: Layout,
     /// Size and first byte of each level.
@@ -169,10 +186,7 @@ pub struct Ktx2Sink {
 
 impl Ktx2Sink {
     /// Opens the file and writes all but the levels.
-    ///
-    /// # Errors
-    /// [`MapError`] when the file cannot be written.
-    pub fn create(path: &Path, header: &Header, layout: Layout) -> Result<Self, MapError> {
+    fn create(path: &Path, header: &Header, layout: Layout) -> Result<Self, MapError> {
         let sizes = level_sizes(layout.size);
         let stored: Vec<u64> = sizes.iter().map(|size| level_bytes(&layout, *size)).collect();
         let front = Front::new(path, header, layout, None, &stored)?;
@@ -189,14 +203,17 @@ impl Ktx2Sink {
     }
 
     /// Gives the file its name; returns its length in bytes.
-    ///
-    /// # Errors
-    /// [`MapError`] when it cannot be completed.
-    pub fn finish(mut self) -> Result<u64, MapError> {
+    fn complete(mut self) -> Result<u64, MapError> {
         let completed = self.file.file().flush();
         completed.map_err(|e| MapError::io(self.file.target(), e))?;
         self.file.finish()?;
         Ok(self.length)
+    }
+}
+
+impl NdfSink for Ktx2Sink {
+    fn finish(self: Box<Self>) -> Result<u64, MapError> {
+        self.complete()
     }
 }
 

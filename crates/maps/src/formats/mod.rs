@@ -15,13 +15,55 @@ mod tiff;
 
 use std::path::Path;
 
-use crate::{Image, MapError, NdfMap};
+use ndfmap_core::bake::LevelSink;
+use ndfmap_core::pyramid::{Layout, Precision};
+use ndfmap_core::words;
+
+use crate::{Header, Image, MapError, NdfMap};
 
 /// Reads a picture from a whole file.
 pub type ReadImage = fn(&Path, &[u8]) -> Result<Image, MapError>;
 
 /// Reads a normal distribution map from a whole file; `None` when the file is a plain picture.
 pub type ReadNdf = fn(&Path, &[u8]) -> Result<Option<NdfMap>, MapError>;
+
+/// Writes a normal distribution map to a file, whole or not at all; returns the file's length in bytes.
+pub type WriteNdf = fn(&Path, &NdfMap, &WriteOptions) -> Result<u64, MapError>;
+
+/// Opens a file that a map is baked into, row by row.
+pub type OpenSink = fn(&Path, &Header, Layout) -> Result<Box<dyn NdfSink>, MapError>;
+
+/// File that a map is being baked into. Dropped before it is finished, nothing of it is left.
+pub trait NdfSink: LevelSink<Error = MapError> {
+    /// Gives the file its name; returns its length in bytes.
+    ///
+    /// # Errors
+    /// [`MapError`] when it cannot be completed.
+    fn finish(self: Box<Self>) -> Result<u64, MapError>;
+}
+
+/// Channels that a map is written with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ChannelLayout {
+    /// Our RGBA layers.
+    #[default]
+    Native,
+    /// OpenImageIO's six `bumpslopes` channels, of the method `slopes` in an OpenEXR file.
+    Bumpslopes,
+}
+
+words!(ChannelLayout { Native => "native", Bumpslopes => "bumpslopes" });
+
+/// How a map is written, where there is a choice; the default is the plain form of every format.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WriteOptions {
+    /// Zstandard, at a level from 1 (fast) to 22, for KTX2; an OpenEXR is compressed as it is.
+    pub zstd: Option<i32>,
+    /// Channels of an OpenEXR.
+    pub channels: ChannelLayout,
+    /// Precision of bumpslopes, whose units differ from the map's; the map's own where there is none.
+    pub precision: Option<Precision>,
+}
 
 /// A row of [`TABLE`].
 pub struct Format {
@@ -35,6 +77,23 @@ pub struct Format {
     pub read_image: Option<ReadImage>,
     /// Reads a normal distribution map; `None` inside when the file is a plain picture.
     pub read_ndf: Option<ReadNdf>,
+    /// Writes a normal distribution map.
+    pub write_ndf: Option<WriteNdf>,
+    /// Opens a file to bake into, in the format's plain form.
+    pub open_sink: Option<OpenSink>,
+}
+
+impl Format {
+    /// Row of a format that is only read.
+    const READ_ONLY: Self = Self {
+        name: "",
+        extensions: &[],
+        magic: &[],
+        read_image: None,
+        read_ndf: None,
+        write_ndf: None,
+        open_sink: None,
+    };
 }
 
 /// Every format there is.
@@ -61,6 +120,19 @@ pub fn detect(path: &Path, bytes: &[u8]) -> Result<&'static Format, MapError> {
         None => format!("is of no known format; known are {}", names.join(", ")),
     };
     Err(MapError::invalid(path, reason))
+}
+
+/// The format that a map is written in, by the file's name.
+///
+/// # Errors
+/// [`MapError`] for a name that asks for no format that maps are written in.
+pub fn to_write(path: &Path) -> Result<&'static Format, MapError> {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let written = || TABLE.iter().filter(|f| f.write_ndf.is_some());
+    written().find(|f| f.extensions.contains(&extension.as_str())).ok_or_else(|| {
+        let names: Vec<String> = written().map(|f| format!(".{}", f.extensions[0])).collect();
+        MapError::unsupported(path, format!("maps are written as {}", names.join(" or ")))
+    })
 }
 
 /// The bytes of a file; a folder or a missing file is an error that says so.

@@ -15,7 +15,7 @@ pub(super) const FORMAT: Format = Format {
     extensions: &["png"],
     magic: &[b"\x89PNG\r\n\x1a\n"],
     read_image: Some(read),
-    read_ndf: None,
+    ..Format::READ_ONLY
 };
 
 /// Deflate cannot shrink below 1/1032 of its output.

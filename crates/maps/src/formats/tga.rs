@@ -13,7 +13,7 @@ use crate::image::check_size;
 use crate::{Image, MapError};
 
 pub(super) const FORMAT: Format =
-    Format { name: "TGA", extensions: &["tga"], magic: &[], read_image: Some(read), read_ndf: None };
+    Format { name: "TGA", extensions: &["tga"], read_image: Some(read), ..Format::READ_ONLY };
 
 fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
     // Sides lie at offsets 12 and 14 of the 18-byte header; they are checked before the decoder sees them.

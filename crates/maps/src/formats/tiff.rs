@@ -20,7 +20,7 @@ pub(super) const FORMAT: Format = Format {
     extensions: &["tif", "tiff"],
     magic: &[b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"],
     read_image: Some(read),
-    read_ndf: None,
+    ..Format::READ_ONLY
 };
 
 /// GDAL_NODATA: the value, as text, of posts that were not measured.

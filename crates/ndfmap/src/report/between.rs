@@ -14,7 +14,7 @@ use ndfmap_core::sphere::DiskLattice;
 
 use super::canvas::{Canvas, LETTER, LINE};
 use super::disks::{PEN, SCALE, SIDE, busiest, plot};
-use crate::measure::{Comparison, Row, Subject};
+use crate::compare::{Comparison, Row, Subject};
 
 /// The level drawn, where there is one.
 const LEVEL: usize = 4;

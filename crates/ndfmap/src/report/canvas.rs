@@ -5,7 +5,7 @@ use font8x8::{BASIC_FONTS, LATIN_FONTS, UnicodeFonts};
 use ndfmap_core::grid::Size;
 use ndfmap_maps::picture::png_bytes;
 
-use crate::Failure;
+use crate::Error;
 
 /// An RGB colour.
 pub(super) type Rgb = [u8; 3];
@@ -50,9 +50,9 @@ impl Canvas {
     }
 
     /// The picture as a PNG file.
-    pub(super) fn to_png(&self) -> Result<Vec<u8>, Failure> {
+    pub(super) fn to_png(&self) -> Result<Vec<u8>, Error> {
         let size = Size { width: self.width, height: self.height };
-        png_bytes(&self.pixels, size).map_err(|e| Failure::Failed(format!("cannot write a picture: {e}")))
+        png_bytes(&self.pixels, size).map_err(|e| Error::Failed(format!("cannot write a picture: {e}")))
     }
 }
 

@@ -10,7 +10,7 @@ use ndfmap_core::pyramid::Precision;
 use ndfmap_core::sphere::DiskLattice;
 
 use super::canvas::{Canvas, LETTER, LINE, heat};
-use crate::measure::{Comparison, Subject};
+use crate::compare::{Comparison, Subject};
 use ndfmap_core::brdf::AnyLobe;
 
 /// Points of the lattice a side, and pixels a point.

@@ -1,9 +1,9 @@
-//! Pictures and the HTML page of a comparison.
+//! Reports: pictures and an HTML page of a comparison, and contact sheets of renderings.
 
 mod between;
 mod canvas;
 mod disks;
-pub(crate) mod pictures;
+mod pictures;
 mod plot;
 mod sheet;
 
@@ -13,22 +13,39 @@ use minijinja::{Environment, context};
 use ndfmap_core::measure::FilteringError;
 use ndfmap_maps::Source;
 
-use crate::Failure;
-use crate::imaging::RenderReport;
-use crate::measure::{Comparison, Subject, three_digits};
+use crate::Error;
+use crate::compare::{Comparison, LevelError, Subject, three_digits};
+use crate::render::RenderReport;
+
+pub use pictures::{SheetPlan, contact_sheet};
 
 /// What a report is drawn from.
-pub(crate) struct Pages<'a> {
-    pub(crate) subject: &'a Subject<'a>,
-    pub(crate) comparison: &'a Comparison,
-    /// Pictures of a scene, where asked for.
-    pub(crate) reel: Option<&'a RenderReport>,
-    pub(crate) source: &'a Source,
-    pub(crate) warnings: &'a [String],
+pub struct Pages<'a> {
+    /// What was compared.
+    pub subject: &'a Subject<'a>,
+    /// What came of it.
+    pub comparison: &'a Comparison,
+    /// Pictures of a scene with the same methods, where there are any.
+    pub pictures: Option<&'a RenderReport>,
+    /// What the map was read from.
+    pub source: &'a Source,
+    /// What its reader warned of.
+    pub warnings: &'a [String],
 }
 
-/// Draws every file of a report: names and bytes.
-pub(crate) fn draw(pages: &Pages<'_>) -> Result<Vec<(&'static str, Vec<u8>)>, Failure> {
+/// File of a report.
+pub struct ReportFile {
+    /// Name, without a folder.
+    pub name: &'static str,
+    /// Contents.
+    pub bytes: Vec<u8>,
+}
+
+/// Draws every file of a report: the page, its figures, and the numbers as JSON.
+///
+/// # Errors
+/// [`Error::Failed`] for what cannot be drawn, and [`Error::Cancelled`].
+pub fn draw(pages: &Pages<'_>) -> Result<Vec<ReportFile>, Error> {
     let sheet = sheet::draw(pages.subject, pages.comparison).to_png()?;
     let disks = disks::draw(pages.subject, pages.comparison)?.to_png()?;
     // It bakes every mixture once more, unaligned: seconds that only those who ask about filtering should wait for.
@@ -36,7 +53,7 @@ pub(crate) fn draw(pages: &Pages<'_>) -> Result<Vec<(&'static str, Vec<u8>)>, Fa
     let between = if asked { between::draw(pages.subject, pages.comparison)? } else { None };
     let between = between.map(|canvas| canvas.to_png()).transpose()?;
     let plot = plot::errors_by_level(pages.comparison)?;
-    let scene = pages.reel.map(|reel| pictures::draw(reel, &pages.source.file)).transpose()?;
+    let scene = pages.pictures.map(|report| contact_sheet(report, &pages.source.file)).transpose()?;
     let figures = Figures {
         sheet: &sheet,
         disks: &disks,
@@ -45,15 +62,16 @@ pub(crate) fn draw(pages: &Pages<'_>) -> Result<Vec<(&'static str, Vec<u8>)>, Fa
         plot: &plot,
     };
     let html = page(pages, &figures)?;
-    let json = format!("{:#}\n", pages.comparison.to_json(&pages.source.file));
+    let json = serde_json::to_string_pretty(pages.comparison).map_err(|e| Error::Failed(e.to_string()))?;
+    let file = |name, bytes| ReportFile { name, bytes };
     let mut files = vec![
-        ("report.html", html.into_bytes()),
-        ("contact-sheet.png", sheet),
-        ("ndf.png", disks),
-        ("compare.json", json.into_bytes()),
+        file("report.html", html.into_bytes()),
+        file("contact-sheet.png", sheet),
+        file("ndf.png", disks),
+        file("compare.json", (json + "\n").into_bytes()),
     ];
-    files.extend(between.map(|between| ("alignment.png", between)));
-    files.extend(scene.map(|scene| ("scene.png", scene)));
+    files.extend(between.map(|between| file("alignment.png", between)));
+    files.extend(scene.map(|scene| file("scene.png", scene)));
     Ok(files)
 }
 
@@ -66,23 +84,25 @@ struct Figures<'a> {
     plot: &'a str,
 }
 
-fn page(pages: &Pages<'_>, figures: &Figures<'_>) -> Result<String, Failure> {
-    let failed = |e: minijinja::Error| Failure::Failed(format!("cannot write the report: {e}"));
+fn page(pages: &Pages<'_>, figures: &Figures<'_>) -> Result<String, Error> {
+    let failed = |e: minijinja::Error| Error::Failed(format!("cannot write the report: {e}"));
     let mut environment = Environment::new();
     environment.add_template("report.html", include_str!("../../templates/report.html")).map_err(failed)?;
     let comparison = pages.comparison;
     let best: Vec<f64> = (0..comparison.sizes.len())
-        .map(|level| comparison.rows.iter().map(|r| r.errors[level]).fold(f64::INFINITY, f64::min))
+        .map(|level| comparison.rows.iter().map(|r| r.levels[level].error).fold(f64::INFINITY, f64::min))
         .collect();
     let rows: Vec<minijinja::Value> = comparison
         .rows
         .iter()
         .map(|row| {
             let cells: Vec<minijinja::Value> = row
-                .errors
+                .levels
                 .iter()
                 .zip(&best)
-                .map(|(error, best)| context! { text => three_digits(*error), best => *error <= best * 1.0005 })
+                .map(|(LevelError { error, .. }, best)| {
+                    context! { text => three_digits(*error), best => *error <= best * 1.0005 }
+                })
                 .collect();
             let bake = format!("{:.1}", row.bake_seconds * 1e3);
             context! { method => row.method.clone(), bytes => row.bytes_per_texel, bake => bake, cells => cells }
@@ -102,7 +122,7 @@ fn page(pages: &Pages<'_>, figures: &Figures<'_>) -> Result<String, Failure> {
     template
         .render(context! {
             map => pages.source.file.clone(),
-            lobe => comparison.lobe.clone(),
+            lobe => comparison.brdf.clone(),
             size => sizes.first(),
             sizes => sizes,
             rows => rows,

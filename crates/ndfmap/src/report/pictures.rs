@@ -5,14 +5,14 @@ use ndfmap_core::metrics::{Picture, display};
 use ndfmap_maps::picture::to_bytes;
 
 use super::canvas::{Canvas, LETTER, LINE, Rgb, heat};
-use crate::Failure;
-use crate::imaging::{PictureErrors, RenderReport};
+use crate::Error;
+use crate::render::{PictureErrors, RenderReport};
 
 /// Difference of display values, over sqrt 3, that is drawn brightest.
 const BRIGHTEST: f32 = 0.5;
 
-/// Where things are on a sheet.
-pub(crate) struct Plan {
+/// Where things are on a contact sheet.
+pub struct SheetPlan {
     picture: Size,
     has_truth: bool,
     columns: usize,
@@ -23,14 +23,16 @@ pub(crate) struct Plan {
 const GAP: usize = 8;
 const TOP: usize = 4 * LINE;
 
-impl Plan {
+impl SheetPlan {
     /// A sheet for this many methods and frames of pictures of a size, perhaps with the truth.
-    pub(crate) fn new(picture: Size, has_truth: bool, methods: usize, frames: usize) -> Self {
+    #[must_use]
+    pub fn new(picture: Size, has_truth: bool, methods: usize, frames: usize) -> Self {
         Self { picture, has_truth, columns: methods + usize::from(has_truth), frames }
     }
 
-    /// Width and height of the sheet.
-    pub(crate) fn size(&self) -> Size {
+    /// Width and height of the sheet, in pixels.
+    #[must_use]
+    pub fn size(&self) -> Size {
         Size { width: GAP + self.columns * self.step_x(), height: TOP + self.frames * self.step_y() }
     }
 
@@ -44,42 +46,45 @@ impl Plan {
     }
 }
 
-/// Draws the sheet as a PNG file: two rows a frame where there is a truth, else one.
-pub(crate) fn draw(reel: &RenderReport, title: &str) -> Result<Vec<u8>, Failure> {
-    let Some(first) = reel.frames.first() else { return Canvas::new(1, 1).to_png() };
+/// Draws the contact sheet of a rendering whose pictures were kept, as a PNG file: two rows a frame where there is a truth, else one.
+///
+/// # Errors
+/// [`Error::Failed`] for a sheet that cannot be encoded.
+pub fn contact_sheet(report: &RenderReport, title: &str) -> Result<Vec<u8>, Error> {
+    let Some(first) = report.frames.first() else { return Canvas::new(1, 1).to_png() };
     let has_truth = first.truth.is_some();
     let size = first.pictures[0].size();
-    let plan = Plan::new(size, has_truth, reel.methods.len(), reel.frames.len());
+    let plan = SheetPlan::new(size, has_truth, report.methods.len(), report.frames.len());
     let Size { width, height } = plan.size();
     let mut canvas = Canvas::new(width.max((title.len() + 2) * LETTER), height);
     canvas.text(GAP, 8, title);
     let column = |at: usize| GAP + at * plan.step_x();
-    for (row, frame) in reel.frames.iter().enumerate() {
+    for (row, frame) in report.frames.iter().enumerate() {
         let y = TOP + row * plan.step_y();
         let below = y + size.height + GAP;
         for (at, picture) in frame.pictures.iter().enumerate() {
             paint(&mut canvas, (column(at), y), picture, frame.exposure);
         }
-        if let (Some(told), Some((truth, taken))) = (frame.truth, frame.pictures.split_first()) {
+        if let (Some(said), Some((truth, taken))) = (frame.truth, frame.pictures.split_first()) {
             let lines = [
                 format!("time {:.3}", frame.time),
-                format!("{} rays a pixel", told.rays),
-                format!("noise {:.4}", told.noise),
+                format!("{} rays a pixel", said.rays),
+                format!("noise {:.4}", said.noise),
                 "right: difference,".to_owned(),
                 format!("{BRIGHTEST} and more is light"),
             ];
             for (line, text) in lines.iter().enumerate() {
                 canvas.text(column(0), below + line * LINE, text);
             }
-            for (at, (take, picture)) in frame.takes.iter().zip(taken).enumerate() {
+            for (at, (result, picture)) in frame.results.iter().zip(taken).enumerate() {
                 difference(&mut canvas, (column(at + 1), below), (picture, truth), frame.exposure);
-                for (line, text) in take.errors.iter().flat_map(|e| lines_of(*e)).enumerate() {
+                for (line, text) in result.errors.iter().flat_map(|e| lines_of(*e)).enumerate() {
                     canvas.text(column(at + 1), below + size.height + 3 + line * LINE, &text);
                 }
             }
         }
     }
-    let names = has_truth.then(|| "truth".to_owned()).into_iter().chain(reel.methods.iter().cloned());
+    let names = has_truth.then(|| "truth".to_owned()).into_iter().chain(report.methods.iter().cloned());
     for (at, name) in names.enumerate() {
         canvas.text(column(at), 2 * LINE + 8, &name);
     }

@@ -7,10 +7,10 @@ use plotters::prelude::{
 use plotters::series::PointSeries;
 use plotters::style::ShapeStyle;
 
-use crate::Failure;
-use crate::measure::Comparison;
+use crate::Error;
+use crate::compare::Comparison;
 
-/// Okabe and Ito's colours, told apart by the colour-blind too; after eight they start again.
+/// Okabe and Ito's colours, said apart by the colour-blind too; after eight they start again.
 const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 0, 0),
     RGBColor(230, 159, 0),
@@ -26,15 +26,15 @@ const COLOURS: [RGBColor; 8] = [
 const FLOOR: f64 = 1e-4;
 
 /// The plot.
-pub(super) fn errors_by_level(comparison: &Comparison) -> Result<String, Failure> {
+pub(super) fn errors_by_level(comparison: &Comparison) -> Result<String, Error> {
     let mut svg = String::new();
-    draw(comparison, &mut svg).map_err(|e| Failure::Failed(format!("cannot draw the plot: {e}")))?;
+    draw(comparison, &mut svg).map_err(|e| Error::Failed(format!("cannot draw the plot: {e}")))?;
     Ok(svg)
 }
 
 fn draw(comparison: &Comparison, svg: &mut String) -> Result<(), Box<dyn std::error::Error>> {
     let last = comparison.sizes.len() - 1;
-    let worst = comparison.rows.iter().flat_map(|r| &r.errors).copied().fold(1.0, f64::max);
+    let worst = comparison.rows.iter().flat_map(|r| &r.levels).map(|l| l.error).fold(1.0, f64::max);
     let area = SVGBackend::with_string(svg, (860, 460)).into_drawing_area();
     area.fill(&WHITE)?;
     let mut chart = ChartBuilder::on(&area)
@@ -54,7 +54,7 @@ fn draw(comparison: &Comparison, svg: &mut String) -> Result<(), Box<dyn std::er
     for (at, row) in comparison.rows.iter().enumerate() {
         let colour = COLOURS[at % COLOURS.len()];
         let style: ShapeStyle = colour.stroke_width(2);
-        let points = || row.errors.iter().enumerate().map(|(l, e)| (l as f64, e.max(FLOOR)));
+        let points = || row.levels.iter().map(|l| (l.level as f64, l.error.max(FLOOR)));
         chart
             .draw_series(LineSeries::new(points(), style))?
             .label(row.method.clone())

@@ -8,7 +8,7 @@ use ndfmap_core::sphere::DiskLattice;
 use rayon::prelude::*;
 
 use super::canvas::{Canvas, LETTER, LINE};
-use crate::measure::{Comparison, Subject, three_digits};
+use crate::compare::{Comparison, Subject, three_digits};
 use ndfmap_core::ndf::AnyMethod;
 
 /// Pixels of a cell's longer side.
@@ -96,8 +96,10 @@ fn columns(subject: &Subject<'_>, comparison: &Comparison, shown: &[(usize, Size
             .iter()
             .map(|(level, size)| texels(*size).map(|(x, y)| value(*level, x, y)).collect())
             .collect();
-        let errors =
-            shown.iter().map(|(level, _)| format!("error {}", three_digits(row.errors[*level]))).collect();
+        let errors = shown
+            .iter()
+            .map(|(level, _)| format!("error {}", three_digits(row.levels[*level].error)))
+            .collect();
         columns.push(Column { title: row.method.clone(), levels, errors });
     }
     columns

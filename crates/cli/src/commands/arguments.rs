@@ -1,0 +1,335 @@
+//! Arguments that several commands take, and how they are read.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use ndfmap::core::brdf::{self, AnyLobe, LobeFactors, ParseLobeError, ShadingModel};
+use ndfmap::core::grid::Size;
+use ndfmap::core::light::environment::{SceneEnvironment, Technique, builtin};
+use ndfmap::core::ndf::{self, AnyMethod, ParseMethodError};
+use ndfmap::core::surface::{SlopeFilter, Wrap, Wraps};
+use ndfmap::core::{pyramid, scene};
+use ndfmap::maps::SourceKind;
+use ndfmap::maps::environment::read_environment;
+use ndfmap::maps::merl::read_merl;
+use ndfmap::maps::model::is_model;
+use ndfmap::maps::source::{Convention, DEFAULT_HEIGHT_SCALE, SourceOptions};
+use serde_json::json;
+
+use ndfmap::{Error, RotatingEnvironment};
+
+/// How to take the source map.
+#[derive(Debug, Args)]
+pub(super) struct SourceArguments {
+    /// Take the map as normals or as heights [default: grey pictures are heights]
+    #[arg(long, value_enum)]
+    from: Option<From>,
+    /// Which way green points in a normal map: up (opengl) or down (directx)
+    #[arg(long, value_enum, default_value_t = ConventionArgument::Opengl)]
+    convention: ConventionArgument,
+    /// Height of one unit (full white), in texture widths
+    #[arg(long, value_name = "S", default_value_t = DEFAULT_HEIGHT_SCALE, value_parser = positive, allow_negative_numbers = true)]
+    height_scale: f64,
+    /// White is deep: the height map is a depth map
+    #[arg(long)]
+    invert: bool,
+    /// How slopes are taken from heights
+    #[arg(long, value_enum, default_value_t = FilterArgument::Central)]
+    slope_filter: FilterArgument,
+    /// What lies beyond the edges: `repeat`, `clamp`, or one for each axis as in `repeat,clamp`
+    #[arg(long, value_name = "X[,Y]", default_value = "repeat", value_parser = wraps)]
+    wrap: Wraps,
+}
+
+/// How large built-in maps are made.
+#[derive(Debug, Args)]
+pub(super) struct BuiltinSize {
+    /// Size of a built-in map, as in 512 or 640x480
+    #[arg(long, value_name = "SIZE", default_value = "512", value_parser = size)]
+    pub(super) size: Size,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum From {
+    Normal,
+    Height,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum ConventionArgument {
+    Opengl,
+    Directx,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum FilterArgument {
+    Central,
+    Sobel,
+    /// Mean and spread of the surface between the heights, over each texel
+    Bilinear,
+}
+
+impl SourceArguments {
+    /// The same as the library has it, for built-in maps of this size.
+    pub(super) fn options(&self, builtin_size: Size) -> SourceOptions {
+        SourceOptions {
+            kind: self.from.map(|from| match from {
+                From::Normal => SourceKind::Normal,
+                From::Height => SourceKind::Height,
+            }),
+            convention: match self.convention {
+                ConventionArgument::Opengl => Convention::OpenGl,
+                ConventionArgument::Directx => Convention::DirectX,
+            },
+            height_scale: self.height_scale,
+            invert: self.invert,
+            slope_filter: match self.slope_filter {
+                FilterArgument::Central => SlopeFilter::CentralDifference,
+                FilterArgument::Sobel => SlopeFilter::Sobel,
+                FilterArgument::Bilinear => SlopeFilter::Bilinear,
+            },
+            wraps: self.wrap,
+            builtin_size,
+        }
+    }
+}
+
+/// Bits of a stored channel.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(super) enum Precision {
+    /// 16-bit floats
+    #[default]
+    Half,
+    /// 32-bit floats
+    Single,
+}
+
+impl std::convert::From<Precision> for pyramid::Precision {
+    fn from(p: Precision) -> Self {
+        match p {
+            Precision::Half => Self::Half,
+            Precision::Single => Self::Single,
+        }
+    }
+}
+
+/// Light from everywhere.
+#[derive(Debug, Args)]
+pub(super) struct EnvironmentArguments {
+    /// Light the scene by an environment in place of its own lights: a float picture (.hdr, .exr) by latitude and longitude or of a cube,
+    /// or `builtin:NAME`
+    #[arg(long, value_name = "FILE", requires = "scene")]
+    environment: Option<PathBuf>,
+    /// Turn the environment around the vertical, in degrees; with two numbers, from one to the other as time goes from 0 to 1
+    #[arg(long, value_name = "DEGREES[,TO]", value_parser = turn, allow_hyphen_values = true, requires = "environment")]
+    turn: Option<[f64; 2]>,
+    /// How highlights look the environment up: cubes that microfacets have blurred (prefiltered), or Han et al.'s series over
+    /// half-vectors (harmonics)
+    #[arg(long, value_name = "HOW", default_value = "prefiltered", value_parser = technique, requires = "environment")]
+    environment_light: Technique,
+}
+
+impl EnvironmentArguments {
+    /// Reads and prepares it.
+    pub(super) fn read(&self) -> Result<Option<RotatingEnvironment>, Error> {
+        let Some(path) = &self.environment else { return Ok(None) };
+        let (environment, warnings) = read_environment(path)?;
+        warnings.iter().for_each(|w| super::warn(path, w));
+        let environment =
+            SceneEnvironment { technique: self.environment_light, ..SceneEnvironment::new(environment) };
+        let suns = &environment.filtered.suns;
+        if !suns.lights.is_empty() {
+            let (count, percent) = (suns.lights.len(), 100.0 * suns.share);
+            let name = path.display();
+            eprintln!(
+                "ndfmap: {name}: {count} small bright source(s), {percent:.1} % of its light, shine as lights of their own"
+            );
+        }
+        Ok(Some(RotatingEnvironment {
+            environment,
+            rotation: self.turn.unwrap_or_default().map(f64::to_radians),
+        }))
+    }
+}
+
+impl EnvironmentArguments {
+    /// What a script may want to know of it.
+    pub(super) fn to_json(&self, read: &RotatingEnvironment) -> serde_json::Value {
+        let suns = &read.environment.filtered.suns;
+        json!({
+            "file": self.environment,
+            "technique": self.environment_light.name(),
+            "turn": read.rotation.map(f64::to_degrees),
+            "suns": suns.lights.len(),
+            "suns_share": suns.share,
+        })
+    }
+}
+
+fn turn(text: &str) -> Result<[f64; 2], String> {
+    let degrees = |t: &str| match t.parse::<f64>() {
+        Ok(v) if v.abs() <= 1e6 => Ok(v),
+        _ => Err(format!("`{t}` is no number of degrees")),
+    };
+    match text.split(',').collect::<Vec<_>>()[..] {
+        [one] => Ok([degrees(one)?; 2]),
+        [from, to] => Ok([degrees(from)?, degrees(to)?]),
+        _ => Err("one number of degrees, or two".to_owned()),
+    }
+}
+
+fn technique(text: &str) -> Result<Technique, String> {
+    let names = Technique::ALL.map(Technique::name).join(", ");
+    Technique::ALL
+        .into_iter()
+        .find(|t| t.name() == text)
+        .ok_or_else(|| format!("`{text}` is none of {names}"))
+}
+
+/// Every built-in environment, for `--help`.
+pub(super) fn environments_help() -> String {
+    let rows = builtin::TABLE.iter().map(|r| format!("  {:12} {}", r.name, r.summary));
+    format!("Built-in environments (`builtin:NAME`):\n{}", rows.collect::<Vec<_>>().join("\n"))
+}
+
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(v) if v.is_finite() && v > 0.0 => Ok(v),
+        _ => Err("must be a number above 0".to_owned()),
+    }
+}
+
+fn wraps(text: &str) -> Result<Wraps, String> {
+    let wrap = |word: &str| match word {
+        "repeat" => Ok(Wrap::Repeat),
+        "clamp" => Ok(Wrap::Clamp),
+        other => Err(format!("`{other}` is neither `repeat` nor `clamp`")),
+    };
+    match text.split(',').collect::<Vec<_>>()[..] {
+        [both] => Ok(Wraps { x: wrap(both)?, y: wrap(both)? }),
+        [x, y] => Ok(Wraps { x: wrap(x)?, y: wrap(y)? }),
+        _ => Err("one word for both axes, or one for each".to_owned()),
+    }
+}
+
+/// Largest side of a built-in map, and of a picture.
+const MAX_BUILTIN: usize = 8192;
+
+pub(super) fn size(text: &str) -> Result<Size, String> {
+    let side = |t: &str| match t.parse::<usize>() {
+        Ok(n @ 1..=MAX_BUILTIN) => Ok(n),
+        _ => Err(format!("`{t}` is no side from 1 to {MAX_BUILTIN}")),
+    };
+    match text.split_once('x') {
+        Some((w, h)) => Ok(Size { width: side(w)?, height: side(h)? }),
+        None => side(text).map(|n| Size { width: n, height: n }),
+    }
+}
+
+/// Checks a method's spelling; an unknown one suggests the nearest.
+pub(super) fn method_spelling(text: &str) -> Result<String, String> {
+    match text.parse::<AnyMethod>() {
+        Ok(_) => Ok(text.to_owned()),
+        Err(ParseMethodError::Unknown(name)) => Err(unknown(&name, ndf::TABLE.iter().map(|r| r.name))),
+        Err(other) => Err(other.to_string()),
+    }
+}
+
+/// What a file of measurements is spelled with.
+const MERL: &str = "merl:";
+
+/// Checks a BRDF's spelling; an unknown one suggests the nearest. Files are for [`read_brdf`] to check.
+pub(super) fn brdf_spelling(text: &str) -> Result<String, String> {
+    if text == "merl" || text == MERL {
+        return Err("a file must follow, as in `merl:FILE`".to_owned());
+    }
+    if text.starts_with(MERL) {
+        return Ok(text.to_owned());
+    }
+    match text.parse::<AnyLobe>() {
+        Ok(_) => Ok(text.to_owned()),
+        Err(ParseLobeError::Unknown(name)) => {
+            Err(unknown(&name, brdf::TABLE.iter().map(|r| r.name).chain(["merl"])))
+        }
+        Err(other) => Err(other.to_string()),
+    }
+}
+
+/// The lobe of a checked spelling. Of one that was measured it is said what its factors leave.
+pub(super) fn read_brdf(spelling: &str) -> Result<AnyLobe, Error> {
+    let lobe: AnyLobe = match spelling.strip_prefix(MERL) {
+        Some(file) => {
+            let (lobe, missing) = read_merl(file.as_ref())?;
+            if missing > 0 {
+                super::warn(
+                    file.as_ref(),
+                    &format!("{missing} values are negative or no number, and left out"),
+                );
+            }
+            lobe.into()
+        }
+        None => spelling.parse::<AnyLobe>().map_err(|e| Error::Request(e.to_string()))?,
+    };
+    if let Some(LobeFactors { residual, kernels, .. }) = lobe.measured() {
+        let [factored, fitted] = [residual.factored, residual.fitted].map(|left| 100.0 * left);
+        eprintln!(
+            "ndfmap: {spelling}: kd + f(theta_h) g(theta_d) leaves {factored:.1} % of the table, and f as {} kernels {fitted:.1} %",
+            kernels.len()
+        );
+    }
+    Ok(lobe)
+}
+
+/// Checks the name of a scene; what is neither built in nor named like a model suggests the nearest.
+pub(super) fn scene_name(text: &str) -> Result<String, String> {
+    if scene::find(text).is_some() || is_model(text.as_ref()) {
+        return Ok(text.to_owned());
+    }
+    let models: Vec<&str> = ndfmap::maps::model::TABLE.iter().flat_map(|f| f.extensions).copied().collect();
+    let nearest = unknown(text, scene::TABLE.iter().map(|r| r.name));
+    Err(format!("{nearest}, and models: .{}", models.join(", .")))
+}
+
+/// Says that a name is unknown, and which is nearest.
+pub(super) fn unknown(name: &str, known: impl Iterator<Item = &'static str> + Clone) -> String {
+    // Below 0.7 the nearest is merely the least far.
+    let near = known.clone().filter(|k| strsim::jaro_winkler(name, k) > 0.7);
+    let nearest = near.max_by(|a, b| strsim::jaro_winkler(name, a).total_cmp(&strsim::jaro_winkler(name, b)));
+    let all = known.collect::<Vec<_>>().join(", ");
+    match nearest {
+        Some(nearest) => format!("there is no `{name}`; did you mean `{nearest}`? There are {all}"),
+        None => format!("there is no `{name}`; there are {all}"),
+    }
+}
+
+/// Every name of a table with its parameters and summary, for `--help`.
+pub(super) fn methods_help() -> String {
+    let rows =
+        ndf::TABLE.iter().map(|r| format!("  {}{}\n      {} ({})", r.name, r.parameters, r.summary, r.paper));
+    format!(
+        "Methods:\n{}\n\nBuilt-in maps (`builtin:NAME`):\n{}",
+        rows.collect::<Vec<_>>().join("\n"),
+        builtin_help()
+    )
+}
+
+fn builtin_help() -> String {
+    let rows = ndfmap::core::procedural::TABLE.iter().map(|r| format!("  {:12} {}", r.name, r.summary));
+    rows.collect::<Vec<_>>().join("\n")
+}
+
+/// Every BRDF with its parameter and summary, for `--help`.
+pub(super) fn brdfs_help() -> String {
+    let rows = brdf::TABLE.iter().map(|r| format!("  {}{}\n      {}", r.name, r.parameter, r.summary));
+    let merl = "  merl:FILE\n      a file of measurements in the MERL format (.binary), factored, in its own colours".to_owned();
+    format!("BRDFs:\n{}", rows.chain([merl]).collect::<Vec<_>>().join("\n"))
+}
+
+/// Reads the name of a shading model.
+pub(super) fn model(text: &str) -> Result<ShadingModel, String> {
+    let names = ShadingModel::ALL.map(ShadingModel::name).join(", ");
+    ShadingModel::ALL
+        .into_iter()
+        .find(|m| m.name() == text)
+        .ok_or_else(|| format!("`{text}` is none of {names}"))
+}

@@ -1,0 +1,222 @@
+//! `ndfmap compare`: the error of each method against the truth, level by level.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use clap::Args;
+use ndfmap::compare::{Comparison, Subject, compare};
+use ndfmap::core::brdf::{AnyLobe, Lobe};
+use ndfmap::core::grid::Size;
+use ndfmap::core::lookup::Lookups;
+use ndfmap::core::ndf::AnyMethod;
+use ndfmap::core::pyramid;
+use ndfmap::core::scene::Effort;
+use ndfmap::maps::source::{SourceMap, read_source};
+use ndfmap::maps::{MapError, atomic};
+use ndfmap::render::{Device, RenderJob, RenderReport, render};
+use ndfmap::report::{self, Pages, ReportFile};
+use ndfmap::{Error, SceneSpec};
+
+use super::arguments::{
+    BuiltinSize, EnvironmentArguments, Precision, SourceArguments, brdf_spelling, brdfs_help,
+    method_spelling, methods_help, read_brdf, scene_name, size,
+};
+use super::render::{DisplaceArguments, FilterArguments, check_drift};
+use super::{print, print_json, say_if_replaced, to_value, warn};
+use crate::tables;
+use crate::terminal::Terminal;
+
+/// What every comparison carries unless told otherwise: the baselines, each linear method, and mixtures.
+pub(super) const DEFAULT_METHODS: &str =
+    "fixed,naive,toksvig,ndm,ndm:plane,slopes,sh:4,sh:7,gmm:4,vmf:2,vmf:4,vmf:6";
+
+/// Measure methods against the truth, level by level
+#[derive(Debug, Args)]
+#[command(after_long_help = format!("{}\n\n{}", methods_help(), brdfs_help()))]
+pub(super) struct Compare {
+    /// The map: a picture file, or `builtin:NAME`
+    map: PathBuf,
+    /// Methods, separated by commas
+    #[arg(long, value_delimiter = ',', default_value = DEFAULT_METHODS, value_parser = method_spelling)]
+    methods: Vec<String>,
+    /// The reflectance lobe they are measured with
+    #[arg(long, default_value = "blinn-phong:50", value_parser = brdf_spelling)]
+    brdf: String,
+    /// Bits of a stored channel; errors are those of the stored map
+    #[arg(long, value_enum, default_value_t = Precision::Half)]
+    precision: Precision,
+    /// Also measure between texels, where a filter mixes lobes: filtered, and by shading every neighbour
+    #[arg(long)]
+    filtering: bool,
+    /// Also write a report with pictures and plots into this folder
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
+    /// Also render the map in a scene, and measure pictures: a built-in scene, or a model file
+    #[arg(long, value_name = "NAME|FILE", value_parser = scene_name)]
+    scene: Option<String>,
+    /// Rays a pixel of the true picture
+    #[arg(long, value_name = "RAYS", default_value_t = 256, requires = "scene",
+        value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    truth: u32,
+    /// Size of the pictures
+    #[arg(long, value_name = "SIZE", default_value = "256", value_parser = size, requires = "scene")]
+    picture: Size,
+    /// Also measure how each method sparkles as the camera drifts by a pixel
+    #[arg(long, requires = "scene")]
+    sparkle: bool,
+    #[command(flatten)]
+    displace: DisplaceArguments,
+    #[command(flatten)]
+    environment: EnvironmentArguments,
+    #[command(flatten)]
+    filter: FilterArguments,
+    #[command(flatten)]
+    source: SourceArguments,
+    #[command(flatten)]
+    builtin: BuiltinSize,
+}
+
+impl Compare {
+    pub(super) fn run(self, json: bool) -> Result<(), Error> {
+        let mut methods: Vec<AnyMethod> = Vec::new();
+        for spelling in &self.methods {
+            let method: AnyMethod = spelling.parse()?;
+            // Two spellings of one method would share a key in the JSON.
+            if !methods.contains(&method) {
+                methods.push(method);
+            }
+        }
+        if self.sparkle {
+            check_drift(self.picture)?;
+        }
+        let map = read_source(&self.map, &self.source.options(self.builtin.size))?;
+        for warning in &map.warnings {
+            warn(&self.map, warning);
+        }
+        let environment = self.environment.read()?;
+        let brdf: AnyLobe = read_brdf(&self.brdf)?;
+        let run = Run {
+            map: &map,
+            methods: &methods,
+            brdf: &*brdf,
+            precision: self.precision.into(),
+            filtering: self.filtering,
+            pictures: self.scene.as_ref().map(|scene| Pictures {
+                scene: SceneSpec {
+                    scene: scene.clone(),
+                    map: Some(Arc::clone(&map.surface)),
+                    lobe: Some(brdf.clone()),
+                    displacement: self.displace.displacement(),
+                    environment: environment.clone(),
+                    ..SceneSpec::default()
+                },
+                times: vec![0.0],
+                size: self.picture,
+                lookups: self.filter.lookups(),
+                truth: Effort { rays: self.truth as usize, noise: 0.0, seed: 0 },
+                sparkle: self.sparkle,
+            }),
+        };
+        let terminal = Terminal::default();
+        let Measured { comparison, pictures, written } = run.measure(self.report.as_deref(), &terminal)?;
+        for file in written {
+            eprintln!("ndfmap: wrote {}", file.display());
+        }
+        if !json {
+            let said = |pictures: &RenderReport| format!("\npictures\n\n{}", tables::rendering(pictures));
+            let pictures = pictures.as_ref().map_or_else(String::new, said);
+            return print(&(tables::comparison(&comparison) + &pictures));
+        }
+        let mut value = to_value(&comparison)?;
+        if let (Some(pictures), Some(scene)) = (pictures, self.scene) {
+            value["scene"] = scene.into();
+            value["truth"] = to_value(&pictures.truth())?;
+            if let Some(read) = &environment {
+                value["environment"] = self.environment.to_json(read);
+            }
+            for (method, measured) in pictures.methods() {
+                value["methods"][method]["picture"] = to_value(&measured)?;
+            }
+        }
+        print_json(&value)
+    }
+}
+
+/// A comparison of a source, perhaps with pictures and a report.
+pub(super) struct Run<'a> {
+    pub(super) map: &'a SourceMap,
+    pub(super) methods: &'a [AnyMethod],
+    pub(super) brdf: &'a dyn Lobe,
+    pub(super) precision: pyramid::Precision,
+    pub(super) filtering: bool,
+    pub(super) pictures: Option<Pictures>,
+}
+
+/// Pictures to be measured.
+pub(super) struct Pictures {
+    pub(super) scene: SceneSpec,
+    pub(super) times: Vec<f64>,
+    pub(super) size: Size,
+    pub(super) lookups: Lookups,
+    pub(super) truth: Effort,
+    pub(super) sparkle: bool,
+}
+
+/// What came of it.
+pub(super) struct Measured {
+    pub(super) comparison: Comparison,
+    pub(super) pictures: Option<RenderReport>,
+    pub(super) written: Vec<PathBuf>,
+}
+
+impl Run<'_> {
+    /// Measures; with a folder, writes the report.
+    pub(super) fn measure(&self, folder: Option<&Path>, terminal: &Terminal) -> Result<Measured, Error> {
+        // A folder that cannot be made, or a scene that is not there, should be known before the minutes of measuring.
+        if let Some(folder) = folder {
+            std::fs::create_dir_all(folder).map_err(|e| MapError::io(folder, e))?;
+        }
+        let pictures = self.pictures.as_ref().map(|pictures| self.render(pictures, terminal)).transpose()?;
+        let subject = Subject {
+            name: &self.map.source.file,
+            surface: &*self.map.surface,
+            lobe: self.brdf,
+            methods: self.methods,
+            precision: self.precision,
+            filtering: self.filtering,
+        };
+        let comparison = compare(&subject, terminal)?;
+        let mut written = Vec::new();
+        if let Some(folder) = folder {
+            let pages = Pages {
+                subject: &subject,
+                comparison: &comparison,
+                pictures: pictures.as_ref(),
+                source: &self.map.source,
+                warnings: &self.map.warnings,
+            };
+            for ReportFile { name, bytes } in report::draw(&pages)? {
+                let path = folder.join(name);
+                say_if_replaced(&path);
+                atomic::write(&path, &bytes)?;
+                written.push(path);
+            }
+        }
+        Ok(Measured { comparison, pictures, written })
+    }
+
+    fn render(&self, pictures: &Pictures, terminal: &Terminal) -> Result<RenderReport, Error> {
+        let job = RenderJob {
+            scene: &pictures.scene,
+            times: &pictures.times,
+            methods: self.methods,
+            size: pictures.size,
+            precision: self.precision,
+            lookups: pictures.lookups,
+            truth: Some(pictures.truth),
+            sparkle: pictures.sparkle,
+            keep: true,
+        };
+        render(&job, &Device::Cpu, terminal, &mut |_, _| Ok(()))
+    }
+}

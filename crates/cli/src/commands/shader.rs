@@ -1,0 +1,81 @@
+//! `ndfmap shader`: decoding and shading of one method, in the language of another program.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use ndfmap::core::brdf::{Brdf, ShadingModel};
+use ndfmap::core::ndf::AnyMethod;
+use ndfmap::gpu::export::{Export, Language, TABLE};
+use serde_json::json;
+
+use super::arguments::{brdf_spelling, brdfs_help, method_spelling, methods_help, model, read_brdf};
+use super::{print_bytes, print_json, say_if_replaced};
+use ndfmap::Error;
+
+/// Write the shader of a method, for other programs
+#[derive(Debug, Args)]
+#[command(after_long_help = format!("{}\n\n{}\n\n{}", languages_help(), methods_help(), brdfs_help()))]
+pub(super) struct Shader {
+    /// The method that the map is baked with
+    #[arg(short, long, default_value = "vmf:4", value_parser = method_spelling)]
+    method: String,
+    /// The reflectance lobe
+    #[arg(long, default_value = "ggx:0.2", value_parser = brdf_spelling)]
+    brdf: String,
+    /// What goes with the lobe: the factor of Tan et al., of Han et al. or of Smith (tan, han, smith)
+    #[arg(long, default_value = "smith", value_parser = model)]
+    model: ShadingModel,
+    /// The language
+    #[arg(short, long, default_value = "wgsl", value_parser = language)]
+    lang: &'static str,
+    /// The file to write [default: stdout]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+fn languages_help() -> String {
+    let rows = TABLE.iter().map(|row| format!("  {:8} {}", row.name, row.summary));
+    format!("Languages:\n{}", rows.collect::<Vec<_>>().join("\n"))
+}
+
+fn find(name: &str) -> Option<&'static Language> {
+    TABLE.iter().find(|row| row.name == name)
+}
+
+fn language(text: &str) -> Result<&'static str, String> {
+    let names = || TABLE.iter().map(|row| row.name);
+    find(text).map(|row| row.name).ok_or_else(|| super::arguments::unknown(text, names()))
+}
+
+impl Shader {
+    pub(super) fn run(self, json: bool) -> Result<(), Error> {
+        let method: AnyMethod = self.method.parse()?;
+        let lobe = read_brdf(&self.brdf)?;
+        let brdf = Brdf { lobe, shading: self.model };
+        let language = find(self.lang).unwrap_or(&TABLE[0]);
+        let bytes = Export { method: &*method, brdf: &brdf }.to(language)?;
+        if let Some(file) = &self.output {
+            say_if_replaced(file);
+            ndfmap::maps::atomic::write(file, &bytes)?;
+            eprintln!("ndfmap: wrote {}", file.display());
+        }
+        if json {
+            // Without a file the text is in the document; what is no text needs one.
+            let text = if self.output.is_some() { None } else { Some(String::from_utf8(bytes.clone())) };
+            let text = text.transpose().map_err(|_| {
+                Error::Request(format!("{} is no text: name a file with `-o`", language.name))
+            })?;
+            return print_json(&json!({
+                "method": method.to_string(),
+                "brdf": brdf.lobe.to_string(),
+                "model": self.model.name(),
+                "language": language.name,
+                "layers": method.layers(),
+                "bytes": bytes.len(),
+                "output": self.output,
+                "text": text,
+            }));
+        }
+        if self.output.is_none() { print_bytes(&bytes) } else { Ok(()) }
+    }
+}

@@ -1,0 +1,92 @@
+//! Tables for a terminal: reports of the library as text.
+
+use ndfmap::choose::Choice;
+use ndfmap::compare::{Comparison, three_digits};
+use ndfmap::core::measure::FilteringError;
+use ndfmap::render::{DriftReport, RenderReport};
+
+/// A comparison: a row a method, a column a level.
+pub(crate) fn comparison(comparison: &Comparison) -> String {
+    let (rows, brdf) = (&comparison.rows, &comparison.brdf);
+    let name = rows.iter().map(|r| r.method.len()).max().unwrap_or(0).max("level".len());
+    let mut text = format!("relative L2 error of the effective lobe against the truth, {brdf}\n\n");
+    text += &format!("{:name$}  bytes  bake ms", "level");
+    for (level, _) in comparison.sizes.iter().enumerate() {
+        text += &format!(" {level:>6}");
+    }
+    text += &format!("\n{:name$}               ", "size");
+    for size in &comparison.sizes {
+        let square = size.width == size.height;
+        let said = if square { size.width.to_string() } else { format!("{}x{}", size.width, size.height) };
+        text += &format!(" {said:>6}");
+    }
+    text.push('\n');
+    for row in rows {
+        text += &format!("{:name$} {:>6} {:>8.1}", row.method, row.bytes_per_texel, row.bake_seconds * 1e3);
+        for level in &row.levels {
+            text += &format!(" {:>6}", three_digits(level.error));
+        }
+        text.push('\n');
+    }
+    if rows.iter().any(|row| !row.filtering.is_empty()) {
+        text += "\nbetween texels (edges and corners): filtered, then by the reference path that shades every neighbour\n\n";
+        for row in rows {
+            for (what, error) in
+                [("filtered", (|e| e.filtered) as fn(&FilteringError) -> f64), ("reference", |e| e.reference)]
+            {
+                text += &format!("{:name$} {what:>15}       -", row.method);
+                for e in &row.filtering {
+                    text += &format!(" {:>6}", three_digits(error(e)));
+                }
+                text.push('\n');
+            }
+        }
+    }
+    text
+}
+
+/// A rendering: a row a method, and a line a truth.
+pub(crate) fn rendering(report: &RenderReport) -> String {
+    let name = report.methods.iter().map(String::len).max().unwrap_or(0).max("method".len());
+    let mut text =
+        format!("{:name$}  frame ms  color_error  relative_l2  brightness    FLIP  sparkle\n", "method");
+    for (method, said) in report.methods() {
+        text += &format!("{method:name$} {:>9.1}", said.frame_ms.median);
+        if let Some(e) = said.error {
+            let or_dash = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+            text += &format!(
+                "  {:>11.4}  {:>11.3}  {:>10.3}  {:>6}  {:>7}",
+                e.color_error,
+                e.relative_l2,
+                e.brightness,
+                or_dash(e.flip),
+                or_dash(e.sparkle)
+            );
+        }
+        text.push('\n');
+    }
+    for f in &report.frames {
+        if let Some(truth) = f.truth {
+            text += &format!(
+                "truth at time {}: {} rays a pixel, noise {:.4}, {:.1} s\n",
+                f.time, truth.rays, truth.noise, truth.seconds
+            );
+        }
+        if let Some(DriftReport { change, noise }) = f.drifting {
+            text += &format!("drifting: it changes by {change:.4} a step, {noise:.4} of that by noise\n");
+        }
+    }
+    text
+}
+
+/// A choice: a row a candidate, and the reason.
+pub(crate) fn choice(choice: &Choice) -> String {
+    let levels = choice.levels.iter().map(usize::to_string).collect::<Vec<_>>().join(" and ");
+    let mut text = format!("error between texels with {}, the worst of levels {levels}:\n", choice.lobe);
+    for c in &choice.candidates {
+        let mark = if c.method == choice.method { "  <- chosen" } else { "" };
+        let error = three_digits(c.error);
+        text += &format!("  {:10} {:>4} bytes a texel {error:>7}{mark}\n", c.method, c.bytes);
+    }
+    text + &format!("ndfmap: chose `{}`: {}", choice.method, choice.why)
+}

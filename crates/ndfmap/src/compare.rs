@@ -1,0 +1,150 @@
+//! Bakes a surface with several methods and measures each against the truth, level by level.
+
+use std::time::Instant;
+
+use ndfmap_core::bake::Bake;
+use ndfmap_core::brdf::Lobe;
+use ndfmap_core::grid::Size;
+use ndfmap_core::measure::{
+    FilteringError, TexelTruth, filtering_error, lattice_for, level_error, true_corners, true_levels,
+};
+use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::observe::{Cancelled, Observer};
+use ndfmap_core::pyramid::{Precision, Pyramid, level_sizes};
+use ndfmap_core::surface::Surface;
+use serde::{Serialize, Serializer};
+
+/// What is compared.
+pub struct Subject<'a> {
+    /// Name of the map, for the report.
+    pub name: &'a str,
+    /// The map.
+    pub surface: &'a dyn Surface,
+    /// The lobe that its texels are seen through.
+    pub lobe: &'a dyn Lobe,
+    /// Methods that bake it.
+    pub methods: &'a [AnyMethod],
+    /// Bits of a stored channel.
+    pub precision: Precision,
+    /// Measure between texels too.
+    pub filtering: bool,
+}
+
+/// Everything that was measured of a map; as JSON, what `ndfmap compare --json` prints.
+#[derive(Clone, Debug, Serialize)]
+pub struct Comparison {
+    /// Name of the map.
+    pub map: String,
+    /// Texels in a row of the finest level.
+    pub width: usize,
+    /// Rows of the finest level.
+    pub height: usize,
+    /// Spelling of the lobe.
+    pub brdf: String,
+    /// Sizes of the levels, finest first.
+    #[serde(skip)]
+    pub sizes: Vec<Size>,
+    /// Each method's map and errors; as JSON an object with a key a method.
+    #[serde(rename = "methods", serialize_with = "by_method")]
+    pub rows: Vec<Row>,
+}
+
+/// One method's map and its errors.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// Spelling of the method.
+    #[serde(skip)]
+    pub method: String,
+    /// Bytes of a texel of the finest level.
+    pub bytes_per_texel: usize,
+    /// Seconds that the bake took.
+    pub bake_seconds: f64,
+    /// The baked map.
+    #[serde(skip)]
+    pub pyramid: Pyramid,
+    /// Errors, one a level, finest first.
+    pub levels: Vec<LevelError>,
+    /// Errors between texels, where asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty", serialize_with = "filtering_errors")]
+    pub filtering: Vec<FilteringError>,
+}
+
+/// Error of a level.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LevelError {
+    /// The level, 0 the finest.
+    pub level: usize,
+    /// Relative L2 error of the effective lobes, 0 for perfect ones.
+    pub error: f64,
+}
+
+/// Rows as an object with a key a method.
+fn by_method<S: Serializer>(rows: &[Row], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(rows.iter().map(|row| (&row.method, row)))
+}
+
+/// Errors between texels, by the names that scripts know.
+fn filtering_errors<S: Serializer>(errors: &[FilteringError], serializer: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Between {
+        level: usize,
+        texels: f64,
+        between: f64,
+        reference: f64,
+    }
+    serializer.collect_seq(errors.iter().map(|e| Between {
+        level: e.level,
+        texels: e.texels,
+        between: e.filtered,
+        reference: e.reference,
+    }))
+}
+
+/// Bakes and measures.
+///
+/// # Errors
+/// [`Cancelled`] by the observer.
+pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Comparison, Cancelled> {
+    let lattice = lattice_for(subject.lobe);
+    let size = subject.surface.size();
+    let sizes = level_sizes(size);
+    observer.begin("truth");
+    let truth = TexelTruth::new(subject.surface, subject.lobe, &lattice);
+    let part = if subject.filtering { 0.5 } else { 1.0 };
+    let truths = true_levels(&truth, &observer.part(0.0, part))?;
+    // Level 0 is the map itself, filtered as it has always been.
+    let levels: Vec<usize> = if subject.filtering { (1..sizes.len()).collect() } else { Vec::new() };
+    let corners = true_corners(&truth, subject.surface.wraps(), &levels, &observer.part(part, 1.0))?;
+    let mut rows = Vec::new();
+    for method in subject.methods {
+        observer.begin(&method.to_string());
+        let start = Instant::now();
+        let bake = Bake::new(subject.surface, &**method).precision(subject.precision).observer(observer);
+        let (pyramid, _) = bake.to_pyramid()?;
+        let bake_seconds = start.elapsed().as_secs_f64();
+        let error = |(level, truth)| LevelError {
+            level,
+            error: level_error(&pyramid, &**method, subject.lobe, &lattice, truth),
+        };
+        let between = |truth| filtering_error(&pyramid, &**method, subject.lobe, &lattice, truth);
+        rows.push(Row {
+            method: method.to_string(),
+            bytes_per_texel: method.layers() * subject.precision.texel_bytes(),
+            bake_seconds,
+            levels: truths.iter().enumerate().map(error).collect(),
+            filtering: corners.iter().map(between).collect(),
+            pyramid,
+        });
+    }
+    let (map, brdf) = (subject.name.to_owned(), subject.lobe.to_string());
+    Ok(Comparison { map, width: size.width, height: size.height, brdf, sizes, rows })
+}
+
+/// A number in six columns, three significant digits where it matters.
+pub fn three_digits(value: f64) -> String {
+    match value {
+        v if v < 0.0005 => format!("{v:.0e}"),
+        v if v < 10.0 => format!("{v:.3}"),
+        v => format!("{v:.1}"),
+    }
+}

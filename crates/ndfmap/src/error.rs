@@ -1,0 +1,55 @@
+//! Errors of the library: why something was not done.
+
+use ndfmap_core::bake::BakeError;
+use ndfmap_core::ndf::ParseMethodError;
+use ndfmap_core::observe::Cancelled;
+#[cfg(feature = "gpu")]
+use ndfmap_gpu::GpuError;
+use ndfmap_maps::MapError;
+
+/// Why something was not done.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// What was asked for does not exist, or does not fit what else was asked for.
+    #[error("{0}")]
+    Request(String),
+    /// A file could not be read or written.
+    #[error(transparent)]
+    Map(#[from] MapError),
+    /// A GPU could not do it.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Gpu(GpuError),
+    /// The observer wanted no more.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// Something else went wrong.
+    #[error("{0}")]
+    Failed(String),
+}
+
+impl From<BakeError<MapError>> for Error {
+    fn from(error: BakeError<MapError>) -> Self {
+        match error {
+            BakeError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            BakeError::Sink(error) => Self::Map(error),
+        }
+    }
+}
+
+impl From<ParseMethodError> for Error {
+    fn from(error: ParseMethodError) -> Self {
+        Self::Request(error.to_string())
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl From<GpuError> for Error {
+    fn from(error: GpuError) -> Self {
+        match error {
+            GpuError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            other => Self::Gpu(other),
+        }
+    }
+}

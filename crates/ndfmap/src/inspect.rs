@@ -1,0 +1,251 @@
+//! Descriptions of files and texels, for people and scripts.
+
+use std::path::Path;
+
+use ndfmap_core::ndf::{Decoded, NormalLobe};
+use ndfmap_core::surface::{SurfaceRow, integrability, slope_of_normal};
+use ndfmap_maps::source::SourceMap;
+use ndfmap_maps::{Header, MapError, NdfMap, Source, SourceKind};
+use serde::{Serialize, Serializer};
+
+use crate::Error;
+
+/// Description of a baked map.
+#[derive(Clone, Debug, Serialize)]
+pub struct MapReport {
+    /// Header of the file.
+    #[serde(flatten)]
+    pub header: Header,
+    /// RGBA layers.
+    pub layers: usize,
+    /// Bits of a stored channel: `half` or `single`.
+    pub precision: String,
+    /// Sizes of the levels, finest first.
+    pub levels: Vec<LevelSize>,
+}
+
+/// Size of a level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct LevelSize {
+    /// Texels in a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+/// Description of a map that is to be baked.
+#[derive(Clone, Debug, Serialize)]
+pub struct SourceReport {
+    /// `normal` or `height`.
+    pub kind: SourceKind,
+    /// Texels in a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// What it was read from.
+    pub source: Source,
+    /// Length of the mean normal; 1 for a map without relief.
+    pub mean_normal_length: f64,
+    /// Variance of the slopes along x and along y.
+    pub slope_variance: [f64; 2],
+    /// How nearly the normals are those of a surface: 0 for one that is.
+    pub integrability: f64,
+    /// What its reader warned of.
+    pub warnings: Vec<String>,
+}
+
+/// One texel of a baked map, decoded.
+#[derive(Clone, Debug, Serialize)]
+pub struct TexelReport {
+    /// Level, 0 the finest.
+    pub level: usize,
+    /// Column.
+    pub x: usize,
+    /// Row.
+    pub y: usize,
+    /// Spelling of the method.
+    pub method: String,
+    /// The distribution of its normals.
+    #[serde(flatten)]
+    pub decoded: DecodedReport,
+}
+
+/// Distribution of normals, as scripts read it.
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
+pub enum DecodedReport {
+    /// A mean normal.
+    Mean {
+        /// The mean.
+        mean: [f64; 3],
+    },
+    /// A Gaussian in space.
+    Gaussian {
+        /// Mean normal.
+        mean: [f64; 3],
+        /// Covariance of the normals.
+        covariance: [[f64; 3]; 3],
+    },
+    /// A Gaussian of slopes.
+    Slopes {
+        /// Mean slope.
+        mean: [f64; 2],
+        /// Covariance of the slopes.
+        covariance: [[f64; 2]; 2],
+        /// Mean height in texture widths.
+        height: f64,
+    },
+    /// Coefficients of real spherical harmonics.
+    Coefficients {
+        /// Coefficients: l, then m from -l to l.
+        coefficients: Vec<f64>,
+    },
+    /// Lobes.
+    Lobes {
+        /// The lobes that are alive.
+        lobes: Vec<LobeReport>,
+    },
+    /// Phong peaks.
+    Peaks {
+        /// The peaks.
+        peaks: Vec<LobeReport>,
+    },
+}
+
+/// A lobe, as scripts read it; of its three widths it has the one of its kind.
+#[derive(Clone, Debug, Serialize)]
+pub struct LobeReport {
+    /// Number among the lobes of the texel.
+    #[serde(rename = "layer")]
+    pub index: usize,
+    /// Share of the texel.
+    pub weight: f64,
+    /// Mean direction; two numbers for a planar lobe.
+    pub mean: Vec<f64>,
+    /// Concentration of a von Mises-Fisher lobe.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kappa: Option<f64>,
+    /// Exponent of a Phong peak.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exponent: Option<f64>,
+    /// Variance of a planar lobe, on one axis.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub variance: Option<f64>,
+    /// What it carries: the mean of each attribute over its normals, by the attribute's name.
+    #[serde(skip_serializing_if = "Vec::is_empty", serialize_with = "by_name")]
+    pub attributes: Vec<CarriedAttribute>,
+}
+
+/// Mean of an attribute over a lobe's normals.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CarriedAttribute {
+    /// Name of the attribute.
+    pub name: String,
+    /// Its channels.
+    pub mean: Vec<f32>,
+}
+
+/// Attributes as an object with a key a name.
+fn by_name<S: Serializer>(attributes: &[CarriedAttribute], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(attributes.iter().map(|a| (&a.name, &a.mean)))
+}
+
+/// `kappa` or exponent of a lobe whose stored form can tell no spread; JSON has no infinity.
+const MOST_KAPPA: f64 = 1e6;
+
+/// Describes a baked map.
+#[must_use]
+pub fn describe_map(map: &NdfMap) -> MapReport {
+    let size = |s: &ndfmap_core::grid::Size| LevelSize { width: s.width, height: s.height };
+    MapReport {
+        header: map.header.clone(),
+        layers: map.pyramid.layers(),
+        precision: format!("{:?}", map.pyramid.precision()).to_lowercase(),
+        levels: map.pyramid.sizes().iter().map(size).collect(),
+    }
+}
+
+/// Describes a map that is to be baked.
+#[must_use]
+pub fn describe_source(map: &SourceMap) -> SourceReport {
+    let size = map.surface.size();
+    let (mut mean, mut slopes) = (glam::DVec3::ZERO, [0.0_f64; 4]);
+    let mut row = SurfaceRow::flat(size.width);
+    for y in 0..size.height {
+        map.surface.read_row(y, &mut row);
+        for x in 0..size.width {
+            let (n, s) = (row.normal(x), slope_of_normal(row.normal(x)).as_dvec2());
+            mean += n.as_dvec3();
+            for (sum, v) in slopes.iter_mut().zip([s.x, s.y, s.x * s.x, s.y * s.y]) {
+                *sum += v;
+            }
+        }
+    }
+    let texels = size.area() as f64;
+    let [x, y, xx, yy] = slopes.map(|s| s / texels);
+    SourceReport {
+        kind: map.source.kind,
+        width: size.width,
+        height: size.height,
+        source: map.source.clone(),
+        mean_normal_length: (mean / texels).length(),
+        slope_variance: [xx - x * x, yy - y * y],
+        integrability: integrability(&*map.surface),
+        warnings: map.warnings.clone(),
+    }
+}
+
+/// Decodes a texel of a baked map, which came from the file at `path`.
+///
+/// # Errors
+/// [`Error::Request`] for a texel beyond the map, and [`Error::Map`] for a header that names no method.
+pub fn describe_texel(path: &Path, map: &NdfMap, [level, x, y]: [usize; 3]) -> Result<TexelReport, Error> {
+    let sizes = map.pyramid.sizes();
+    let inside = sizes.get(level).is_some_and(|s| x < s.width && y < s.height);
+    if !inside {
+        let range = match sizes.get(level) {
+            Some(s) => format!("level {level} is {} × {}", s.width, s.height),
+            None => format!("levels run from 0 to {}", sizes.len() - 1),
+        };
+        return Err(Error::Request(format!("{}: has no texel {level} {x} {y}: {range}", path.display())));
+    }
+    map.method(path)?;
+    let texel = map.texel(level, x, y).ok_or_else(|| MapError::invalid(path, "cannot be decoded"))?;
+    let lobe = |l: &NormalLobe| {
+        let carried = |(k, attribute): (usize, &ndfmap_maps::Attribute)| {
+            let mean = texel.attribute(k, l.index)?[..attribute.channels.min(4)].to_vec();
+            Some(CarriedAttribute { name: attribute.name.clone(), mean })
+        };
+        LobeReport {
+            index: l.index,
+            weight: l.weight,
+            mean: l.mean.to_array().to_vec(),
+            kappa: None,
+            exponent: None,
+            variance: None,
+            attributes: map.header.attributes.iter().enumerate().filter_map(carried).collect(),
+        }
+    };
+    let concentration = |l: &NormalLobe| Some(l.variance.get().recip().min(MOST_KAPPA));
+    let spherical = |l: &NormalLobe| LobeReport { kappa: concentration(l), ..lobe(l) };
+    let peak = |l: &NormalLobe| LobeReport { exponent: concentration(l), ..lobe(l) };
+    let planar = |l: &NormalLobe| LobeReport {
+        mean: l.mean.truncate().to_array().to_vec(),
+        variance: Some(l.variance.get()),
+        ..lobe(l)
+    };
+    let decoded = match texel.decoded() {
+        Decoded::Mean(mean) => DecodedReport::Mean { mean: mean.to_array() },
+        Decoded::Gaussian { mean, covariance } => {
+            DecodedReport::Gaussian { mean: mean.to_array(), covariance: covariance.to_cols_array_2d() }
+        }
+        Decoded::Slopes { height, mean, covariance: [xx, yy, xy] } => {
+            DecodedReport::Slopes { mean: mean.to_array(), covariance: [[xx, xy], [xy, yy]], height }
+        }
+        Decoded::Coefficients(coefficients) => DecodedReport::Coefficients { coefficients },
+        Decoded::Lobes(lobes) => DecodedReport::Lobes { lobes: lobes.iter().map(spherical).collect() },
+        Decoded::Peaks(peaks) => DecodedReport::Peaks { peaks: peaks.iter().map(peak).collect() },
+        Decoded::PlanarLobes(lobes) => DecodedReport::Lobes { lobes: lobes.iter().map(planar).collect() },
+    };
+    Ok(TexelReport { level, x, y, method: map.header.method.clone(), decoded })
+}

@@ -1,0 +1,149 @@
+//! Specification of a scene: built-in or from a file, with its own camera, lights and lobe or others.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::DVec3;
+use ndfmap_core::brdf::{AnyLobe, ShadingModel};
+use ndfmap_core::grid::Size;
+use ndfmap_core::light::Light;
+use ndfmap_core::light::environment::SceneEnvironment;
+use ndfmap_core::observe::Observer;
+use ndfmap_core::scene::{self, Camera, Scene, SceneOptions};
+use ndfmap_core::surface::Surface;
+use ndfmap_maps::model::{ModelOptions, read_model};
+
+use crate::Error;
+
+/// A scene as asked for; what is `None` or empty stays as the scene has it.
+#[derive(Clone, Default)]
+pub struct SceneSpec {
+    /// Name of a built-in scene, or a model file.
+    pub scene: String,
+    /// Map of the first material.
+    pub map: Option<Arc<dyn Surface>>,
+    /// Size of built-in maps.
+    pub map_size: Option<Size>,
+    /// Lobe of every material.
+    pub lobe: Option<AnyLobe>,
+    /// Shading model of every material.
+    pub shading: Option<ShadingModel>,
+    /// Camera.
+    pub camera: Option<CameraSpec>,
+    /// Lights.
+    pub lights: Vec<Light>,
+    /// Diffuse albedo of the first material, linear RGB.
+    pub diffuse: Option<DVec3>,
+    /// Reflectance of the first material at normal incidence, linear RGB.
+    pub specular: Option<DVec3>,
+    /// What display values are sRGB of: light times this.
+    pub exposure: Option<f64>,
+    /// Let heights displace meshes.
+    pub displacement: Option<DisplacementOptions>,
+    /// Light from everywhere, in place of the scene's own lights.
+    pub environment: Option<RotatingEnvironment>,
+}
+
+/// An environment that turns as time goes.
+#[derive(Clone)]
+pub struct RotatingEnvironment {
+    /// The environment.
+    pub environment: SceneEnvironment,
+    /// Rotation around the vertical in radians, at time 0 and at time 1.
+    pub rotation: [f64; 2],
+}
+
+/// How heights displace meshes.
+#[derive(Clone, Copy, Debug)]
+pub struct DisplacementOptions {
+    /// Times what keeps their slopes.
+    pub scale: f64,
+    /// Facets shade each other.
+    pub shadows: bool,
+}
+
+/// Camera in place of the scene's own.
+#[derive(Clone, Copy, Debug)]
+pub struct CameraSpec {
+    /// Where it is.
+    pub eye: DVec3,
+    /// What is in the middle of the picture.
+    pub target: DVec3,
+    /// Angle of view in degrees, from the bottom to the top of the picture.
+    pub degrees: Option<f64>,
+}
+
+impl SceneSpec {
+    /// True for a scene that depends on time; models do not, but their light may.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        scene::find(&self.scene).is_some()
+            || self.environment.as_ref().is_some_and(|e| e.rotation[0] != e.rotation[1])
+    }
+
+    /// Gives the first material the colours that were asked for.
+    fn colour(&self, scene: &mut Scene) {
+        if let Some(first) = scene.materials.first_mut()
+            && (self.diffuse.is_some() || self.specular.is_some())
+        {
+            first.params.diffuse = self.diffuse.unwrap_or(first.params.diffuse);
+            first.params.specular = self.specular.unwrap_or(first.params.specular);
+            first.textures = None;
+        }
+    }
+
+    /// The scene at a time from 0 to 1. What a model's reader warns of, the observer is told.
+    ///
+    /// # Errors
+    /// [`Error::Map`] for a model that cannot be read, and [`Error::Request`] for a displacement that does not fit.
+    pub fn build(&self, time: f64, observer: &dyn Observer) -> Result<Scene, Error> {
+        let mut staging = SceneOptions { time, map: self.map.clone(), ..SceneOptions::default() };
+        if let Some(size) = self.map_size {
+            staging.map_size = size;
+        }
+        let path = Path::new(&self.scene);
+        let mut scene = match scene::find(&self.scene) {
+            Some(row) => (row.build)(&staging),
+            None => {
+                let (scene, warnings) = read_model(path, &ModelOptions { staging })?;
+                warnings.iter().for_each(|w| observer.note(&format!("warning: {}: {w}", path.display())));
+                scene
+            }
+        };
+        self.colour(&mut scene);
+        if let Some(lobe) = &self.lobe {
+            scene.set_brdf(&**lobe);
+            if lobe.measured().is_some() {
+                // It has brought its own.
+                self.colour(&mut scene);
+            }
+        }
+        if let Some(shading) = self.shading {
+            scene.set_shading(shading);
+        }
+        if let Some(DisplacementOptions { scale, shadows }) = self.displacement {
+            if let Some(measured) = self.lobe.as_ref().filter(|lobe| lobe.measured().is_some()) {
+                let why = "a measured lobe is none of microfacets, which displaced surfaces are made of";
+                return Err(Error::Request(format!("--displace: {}: {why}", measured)));
+            }
+            scene.displace(scale, shadows).map_err(|e| {
+                Error::Request(format!("--displace {}: {e}; name one with `--map`", self.scene))
+            })?;
+        }
+        if let Some(camera) = self.camera {
+            let degrees = camera.degrees.unwrap_or(scene.camera.degrees);
+            scene.camera = Camera::new(camera.eye.into(), camera.target.into(), degrees);
+        }
+        if !self.lights.is_empty() || self.environment.is_some() {
+            scene.lights.clone_from(&self.lights);
+        }
+        if let Some(RotatingEnvironment { environment, rotation: [from, to] }) = &self.environment {
+            let rotation = from + (to - from) * time;
+            scene.environment = Some(SceneEnvironment { rotation, ..environment.clone() });
+        }
+        if let Some(exposure) = self.exposure {
+            scene.exposure = exposure as f32;
+        }
+        Ok(scene)
+    }
+}
