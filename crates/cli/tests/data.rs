@@ -6,18 +6,9 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
-use common::{json, ndfmap, root};
+use common::{data, json, ndfmap};
 use ndfmap::maps::formats::read_image;
 use serde_json::Value;
-
-fn data() -> Option<PathBuf> {
-    let folder = root().join("../shared/data");
-    if folder.exists() {
-        return Some(folder);
-    }
-    eprintln!("SKIPPED: the data folder is not beside this checkout");
-    None
-}
 
 fn files(folder: &Path) -> Vec<PathBuf> {
     let mut files: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()).collect();

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{json, root};
+use common::json;
 use serde_json::Value;
 
 /// Colour errors of methods in one picture of 500 × 500.
@@ -51,11 +51,7 @@ fn armour_far_away_beats_a_fixed_brdf_threefold() {
 
 #[test]
 fn lobes_do_not_sparkle_on_real_maps() {
-    let data = root().join("../shared/data/normal");
-    if !data.exists() {
-        eprintln!("SKIPPED: the data folder is not beside this checkout");
-        return;
-    }
+    let Some(data) = common::data().map(|data| data.join("normal")) else { return };
     for map in [
         "ambientcg_Bricks075B_1K_NormalGL.jpg",
         "godot_wool_normal.png",
