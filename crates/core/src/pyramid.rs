@@ -177,6 +177,16 @@ impl Pyramid {
         Ok(Self { layers: layout.layers, precision: layout.precision, wraps: layout.wraps, sizes, levels })
     }
 
+    /// The same with its first layers alone: what a method of fewer layers reads of it.
+    #[must_use]
+    pub fn first_layers(&self, layers: usize) -> Self {
+        let layers = layers.min(self.layers);
+        let layout = Layout { layers, ..self.layout() };
+        let first = |(size, bytes): (&Size, &Vec<u8>)| bytes[..layout.layer_bytes(*size) * layers].to_vec();
+        let levels = self.sizes.iter().zip(&self.levels).map(first).collect();
+        Self { layers, levels, sizes: self.sizes.clone(), ..*self }
+    }
+
     /// Size of the finest level, layers, precision and wraps.
     #[must_use]
     pub fn layout(&self) -> Layout {

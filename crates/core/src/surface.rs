@@ -145,8 +145,8 @@ pub trait Surface: Send + Sync {
         None
     }
 
-    /// The map of it that a method (by its spelling) has baked before, if it comes with one.
-    fn baked(&self, _method: &dyn Method) -> Option<&Pyramid> {
+    /// The map of it as a method reads it, where it comes with one that was baked before.
+    fn baked(&self, _method: &dyn Method) -> Option<Pyramid> {
         None
     }
 }

@@ -23,6 +23,7 @@ const SURROUNDINGS: &str = include_str!("passes/environment.wgsl");
 const TRUTH: &str = include_str!("passes/truth.wgsl");
 
 /// The pass that draws places and faces.
+#[cfg(feature = "render")]
 const PLACE: &str = include_str!("passes/place.wgsl");
 
 /// A checked shader.
@@ -66,6 +67,7 @@ pub fn truth(lobe: &dyn Lobe) -> Result<Linked, GpuError> {
 }
 
 /// The shader that draws places and faces, for outlines.
+#[cfg(feature = "render")]
 pub(crate) fn place() -> Result<Linked, GpuError> {
     check([SCENE, PLACE].join("\n"))
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::DVec3;
 use ndfmap_core::brdf::{Brdf, SurfaceParams};
 use ndfmap_core::lookup::{Filtering, PixelFootprint, Texels};
-use ndfmap_core::ndf::{AnyMethod, Decoded, FilteredTexel, IncidentLight};
+use ndfmap_core::ndf::{AnyMethod, Decoded, FilteredTexel, IncidentLight, Method};
 use ndfmap_core::pyramid::{Layout, Precision, Pyramid};
 
 use crate::formats::{WriteOptions, read_file, read_ndf, to_write};
@@ -48,6 +48,24 @@ impl NdfMap {
     /// [`MapError`] when the header names none; `path` is for its words.
     pub fn method(&self, path: &Path) -> Result<AnyMethod, MapError> {
         method_of(path, &self.header)
+    }
+
+    /// The map as another method reads it: `slopes:9` what `slopes` has baked, `naive` what `toksvig` has, `sh:4` what `sh:7` has. Lobes
+    /// stay as they were fitted, whatever alignment the method would have asked for.
+    ///
+    /// # Errors
+    /// [`MapError`] for a method that reads other channels, and for a header that names none; `path` is for its words.
+    pub fn read_by(&self, path: &Path, method: &dyn Method) -> Result<Self, MapError> {
+        let own = self.method(path)?;
+        if !method.reads(&own.encoding()) {
+            let reason = format!("was baked by `{own}`, whose channels `{method}` does not read");
+            return Err(MapError::unsupported(path, reason));
+        }
+        let header = Header { method: method.to_string(), ..self.header.clone() };
+        if self.header.attributes.is_empty() {
+            return Ok(Self { header, pyramid: self.pyramid.first_layers(method.layers()) });
+        }
+        Ok(Self { header, pyramid: self.pyramid.clone() })
     }
 
     /// A texel as it is stored; `None` beyond the map, or where the header names no method.

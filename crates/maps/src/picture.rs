@@ -3,7 +3,7 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use exr::prelude::{Encoding, Image as ExrImage, SpecificChannels, WritableImage};
+use exr::prelude::{Encoding, Image as ExrImage, LineOrder, SpecificChannels, WritableImage};
 use glam::Vec3;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::metrics::{Picture, display};
@@ -75,7 +75,8 @@ pub fn write_picture(path: &Path, picture: &Picture, exposure: f32) -> Result<()
             let layer = exr::image::Layer::new(
                 (size.width, size.height),
                 exr::meta::header::LayerAttributes::default(),
-                Encoding::FAST_LOSSLESS,
+                // In any other order, blocks lie in the file as threads finish them.
+                Encoding { line_order: LineOrder::Increasing, ..Encoding::FAST_LOSSLESS },
                 channels,
             );
             let mut bytes = Cursor::new(Vec::new());

@@ -7,11 +7,14 @@ mod common;
 use std::path::Path;
 
 use common::{HEIGHT, WIDTH, baked, pictures, png, rgb8};
+use glam::Vec3;
 use ndfmap_core::bake::{LevelSink, Place};
-use ndfmap_core::grid::Size;
+use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::surface::{Surface, SurfaceRow};
 use ndfmap_maps::formats::{read_file, read_image, read_ndf, to_write};
+use ndfmap_maps::picture::write_picture;
 use ndfmap_maps::source::{SourceMap, SourceOptions, read_source, source_of_image};
 use ndfmap_maps::{ChannelLayout, NdfMap, SourceKind, WriteOptions};
 
@@ -210,4 +213,57 @@ fn bumpslopes_come_back_for_heights_and_normals() {
     let naive = baked("naive", "armour", Precision::Half);
     let error = naive.save(&path, &BUMPSLOPES).unwrap_err().to_string();
     assert!(error.ends_with("holds the method `slopes`, not `naive`"));
+}
+
+#[test]
+fn a_map_is_read_by_every_method_of_its_channels() {
+    let path = Path::new("map.ktx2");
+    let by = |map: &NdfMap, method: &str| map.read_by(path, &*method.parse::<AnyMethod>().unwrap());
+    for (baked_by, readers) in [
+        ("slopes", &["slopes:9", "slopes:9:drawn"] as &[&str]),
+        ("toksvig", &["naive"]),
+        ("sh:7", &["sh:7:printed", "sh:4", "sh:2"]),
+        ("vmf:4", &["vmf:4:parent"]),
+        ("ndm:gaussian:integrated", &["ndm", "ndm:plane", "ndm:pearson"]),
+    ] {
+        let map = baked(baked_by, "foil", Precision::Single);
+        for method in readers {
+            let read = by(&map, method).unwrap();
+            assert_eq!(read.header.method, *method);
+            // What it decodes to is what the method itself would have baked, where nothing is fitted.
+            if !baked_by.starts_with("vmf") {
+                let own = baked(method, "foil", Precision::Single);
+                assert_eq!(
+                    read.texel(2, 1, 1).unwrap().decoded(),
+                    own.texel(2, 1, 1).unwrap().decoded(),
+                    "{method}"
+                );
+            }
+        }
+    }
+    let slopes = baked("slopes", "foil", Precision::Half);
+    for method in ["toksvig", "vmf:4", "sh:4"] {
+        let error = by(&slopes, method).unwrap_err().to_string();
+        assert!(error.contains("was baked by `slopes`"), "{error}");
+    }
+    // More coefficients than there are.
+    assert!(by(&baked("sh:4", "foil", Precision::Half), "sh:7").is_err());
+}
+
+#[test]
+fn a_picture_is_written_as_the_same_bytes_every_time() {
+    // As many blocks as compress on all threads at once.
+    let size = Size { width: 300, height: 400 };
+    let wave = |x: usize, y: usize| ((x * y) as f32 * 0.37).sin();
+    let picture = Grid::from_fn(size, |x, y| Vec3::new(wave(x, y), wave(y, x + 1), 0.5));
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["picture.exr", "picture.png"] {
+        let path = folder.path().join(name);
+        let written = || {
+            write_picture(&path, &picture, 1.0).unwrap();
+            std::fs::read(&path).unwrap()
+        };
+        let first = written();
+        assert!((0..8).all(|_| written() == first), "{name}");
+    }
 }

@@ -3,7 +3,7 @@
 use ndfmap_core::bake::BakeError;
 use ndfmap_core::ndf::ParseMethodError;
 use ndfmap_core::observe::Cancelled;
-#[cfg(feature = "gpu")]
+#[cfg(feature = "shaders")]
 use ndfmap_gpu::GpuError;
 use ndfmap_maps::MapError;
 
@@ -18,7 +18,7 @@ pub enum Error {
     #[error(transparent)]
     Map(#[from] MapError),
     /// A GPU could not do it.
-    #[cfg(feature = "gpu")]
+    #[cfg(feature = "shaders")]
     #[error(transparent)]
     Gpu(GpuError),
     /// The observer wanted no more.
@@ -44,7 +44,7 @@ impl From<ParseMethodError> for Error {
     }
 }
 
-#[cfg(feature = "gpu")]
+#[cfg(feature = "shaders")]
 impl From<GpuError> for Error {
     fn from(error: GpuError) -> Self {
         match error {

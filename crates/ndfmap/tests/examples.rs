@@ -52,7 +52,7 @@ fn a_scene_is_rendered() {
     assert!(picture.starts_with(b"\x89PNG") && picture.len() > 10_000, "{} bytes", picture.len());
 }
 
-#[cfg(feature = "gpu")]
+#[cfg(feature = "shaders")]
 #[test]
 fn a_shader_is_exported() {
     let folder = tempfile::tempdir().unwrap();

@@ -35,7 +35,7 @@ impl BakedMaterial {
     ) -> Result<Self, Cancelled> {
         let maps = material.textures.as_ref().map_or_else(Vec::new, |map| map.grids());
         if let Some(pyramid) = material.surface.baked(method) {
-            return Ok(Self { pyramid: pyramid.clone(), attributes: 0, params: maps });
+            return Ok(Self { pyramid, attributes: 0, params: maps });
         }
         let bake = Bake::new(&*material.surface, method).precision(precision).observer(observer);
         if method.carries_attributes() {
@@ -90,11 +90,9 @@ impl Surface for BakedSurface {
         })
     }
 
-    /// For methods that read the same channels, and would have fitted the same lobes.
-    fn baked(&self, method: &dyn Method) -> Option<&Pyramid> {
-        let same = method.reads(&self.method.encoding())
-            && method.layers() == self.method.layers()
-            && method.fit() == self.method.fit();
-        same.then_some(&self.pyramid)
+    /// For methods that read its channels, or the first of them, and would have fitted the same lobes.
+    fn baked(&self, method: &dyn Method) -> Option<Pyramid> {
+        let same = method.reads(&self.method.encoding()) && method.fit() == self.method.fit();
+        same.then(|| self.pyramid.first_layers(method.layers()))
     }
 }
