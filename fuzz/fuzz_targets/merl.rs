@@ -1,5 +1,6 @@
 #![no_main]
-//! Any bytes as a table of measurements: a header, and values that are repeated to fill a table where the first byte says so.
+//! Any bytes as a table of measurements: a header, and values that are repeated to fill a table where the
+//! first byte says so.
 
 use std::path::Path;
 

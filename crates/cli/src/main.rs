@@ -11,7 +11,8 @@ use clap::Parser;
 use commands::Program;
 use ndfmap::Error;
 
-/// Bands of a bake come and go by the megabyte; the system's allocator gives each back and faults it in again.
+/// Bands of a bake come and go by the megabyte; the system's allocator gives each back and faults it in
+/// again.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 

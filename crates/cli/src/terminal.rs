@@ -1,4 +1,5 @@
-//! The terminal as an observer: a progress bar on stderr, shown only when that is a terminal, and notes above it.
+//! The terminal as an observer: a progress bar on stderr, shown only when that is a terminal, and notes above
+//! it.
 
 use std::sync::{Mutex, PoisonError};
 

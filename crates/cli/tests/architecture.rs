@@ -165,8 +165,9 @@ fn every_path_in_the_documents_exists() {
 
 #[test]
 fn every_command_in_the_documents_runs() {
-    // Commands are the lines of `sh` blocks that begin with `ndfmap` or `cargo run --release --`. They run in a folder
-    // of their own, on built-in maps; lines about a reader's own files are marked by a name in capitals.
+    // Commands are the lines of `sh` blocks that begin with `ndfmap` or `cargo run --release --`. They run in
+    // a folder of their own, on built-in maps; lines about a reader's own files are marked by a name in
+    // capitals.
     let folder = tempfile::tempdir().unwrap();
     let mut ran = 0;
     for file in tracked().iter().filter(|f| f.extension().is_some_and(|e| e == "md")) {
@@ -283,6 +284,56 @@ fn every_crate_can_be_packed() {
             let own = root().join("crates").join(of).canonicalize().unwrap();
             let inside = full.as_ref().is_ok_and(|f| f.starts_with(&own));
             assert!(inside || file.to_string_lossy().contains("/tests/"), "{}: {path}", file.display());
+        }
+    }
+}
+
+/// Columns that a line of prose or of a comment may have.
+const WIDTH: usize = 110;
+
+#[test]
+fn prose_is_no_wider_than_a_page() {
+    for file in tracked() {
+        let extension = file.extension().unwrap_or_default().to_string_lossy().into_owned();
+        let (markdown, code) = (extension == "md", extension == "rs" || extension == "wgsl");
+        if !markdown && !code {
+            continue;
+        }
+        let mut block = false;
+        for (at, line) in read(&file).lines().enumerate() {
+            let start = line.trim_start();
+            block ^= markdown && start.starts_with("```");
+            // Tables, blocks of commands, pictures and what one word fills are as wide as they are.
+            let prose =
+                markdown && !block && !start.starts_with(['|', '!']) || code && start.starts_with("//");
+            let one_word = start.split(' ').filter(|word| word.chars().count() > 60).count() > 0;
+            assert!(
+                !prose || one_word || line.chars().count() <= WIDTH,
+                "{} line {}: {} columns",
+                file.display(),
+                at + 1,
+                line.chars().count()
+            );
+        }
+    }
+}
+
+#[test]
+fn tables_in_the_documents_are_tables() {
+    for file in tracked().iter().filter(|f| f.extension().is_some_and(|e| e == "md")) {
+        let text = read(file);
+        let lines: Vec<&str> = text.lines().collect();
+        let cells = |line: &str| line.replace("\\|", "").matches('|').count();
+        for (at, line) in lines.iter().enumerate().filter(|(_, line)| line.starts_with('|')) {
+            let first = at == 0 || !lines[at - 1].starts_with('|');
+            let place = format!("{} line {}: {line}", file.display(), at + 1);
+            if first {
+                let rule = lines.get(at + 1).copied().unwrap_or_default();
+                assert!(rule.starts_with('|') && rule.chars().all(|c| "|-: ".contains(c)), "{place}");
+                assert!(at == 0 || lines[at - 1].is_empty(), "{place}: needs an empty line above");
+            } else {
+                assert_eq!(cells(line), cells(lines[at - 1]), "{place}");
+            }
         }
     }
 }

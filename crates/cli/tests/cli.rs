@@ -94,8 +94,8 @@ fn picture(
 
 #[test]
 fn attributes_stay_with_their_lobes() {
-    // Left-facing texels are red, right-facing ones green, in a checkerboard: the coarsest texel has two lobes, each of
-    // its own colour, where an average would be brown.
+    // Left-facing texels are red, right-facing ones green, in a checkerboard: the coarsest texel has two
+    // lobes, each of its own colour, where an average would be brown.
     let folder = tempfile::tempdir().unwrap();
     let [normal, albedo, roughness, small, file] =
         ["n.png", "a.png", "g.png", "s.png", "map.ktx2"].map(|n| text(&folder.path().join(n)));

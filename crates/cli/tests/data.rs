@@ -117,7 +117,8 @@ fn fitted_lobes_are_at_least_as_good_as_the_independent_program() {
                 "{map} s = {s} {method}: {got:.3}, numpy {expected} ({:+.1} %)",
                 (got / expected - 1.0) * 100.0
             );
-            // It drew 64 random blocks where we take every texel: up to 6 % on the linear methods, and fits differ.
+            // It drew 64 random blocks where we take every texel: up to 6 % on the linear methods, and fits
+            // differ.
             assert!(got < 1.12 * expected, "{map} {s} {method}: {got} for {expected}");
         }
     }
@@ -142,7 +143,8 @@ fn alignment_pays_between_the_texels_of_real_maps() {
             between("vmf:4:unaligned"),
             between("toksvig")
         );
-        // How much is gained differs from map to map (the benchmark `lobes` has the medians); something always is.
+        // How much is gained differs from map to map (the benchmark `lobes` has the medians); something
+        // always is.
         assert!(between("vmf:4") < between("vmf:4:parent"), "{map}");
         assert!(
             between("vmf:4") < 0.6 * between("vmf:4:unaligned")
@@ -198,8 +200,9 @@ fn real_environments_light_without_black_or_burnt_pixels() {
             ]);
             let error = &told["methods"]["vmf:4"]["error"];
             eprintln!("{file} {how}: {error}, noise {}", told["truth"]["noise"]);
-            // That it is a picture of the same light: within a twentieth. But Han et al.'s sum over half-vectors knows of no horizon, and is
-            // held at nought where it rings: in the cellar and the studio, dark but for openings and lamps, it is 18 and 12 % too bright.
+            // That it is a picture of the same light: within a twentieth. But Han et al.'s sum over
+            // half-vectors knows of no horizon, and is held at nought where it rings: in the cellar and the
+            // studio, dark but for openings and lamps, it is 18 and 12 % too bright.
             let dark = file.contains("cellar") || file.contains("studio");
             let bound = if how == "harmonics" && dark { 0.2 } else { 0.05 };
             assert!((error["brightness"].as_f64().unwrap() - 1.0).abs() < bound, "{file} {how}: {error}");

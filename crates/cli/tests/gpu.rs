@@ -1,4 +1,5 @@
-//! `render --device gpu` and `shader`, as users run them. On a machine without any adapter the first skips, visibly.
+//! `render --device gpu` and `shader`, as users run them. On a machine without any adapter the first skips,
+//! visibly.
 
 #![cfg(feature = "gpu")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
@@ -69,8 +70,8 @@ fn the_gpu_draws_the_film_that_the_cpu_draws() {
     }
     for frame in ["0000", "0001"] {
         let name = |device: &str| folder.path().join(format!("{device}-{frame}.png"));
-        // As in `crates/gpu/tests/pictures.rs`: a thousandth of the pixels have edges that fall either way. Spikes and legs have more
-        // edges than the scenes there.
+        // As in `crates/gpu/tests/pictures.rs`: a thousandth of the pixels have edges that fall either way.
+        // Spikes and legs have more edges than the scenes there.
         let off = off(&name("gpu"), &name("cpu"));
         assert!(off < 2e-3, "frame {frame}: {off} of the pixels differ");
     }

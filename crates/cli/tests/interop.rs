@@ -70,8 +70,8 @@ fn lobes_are_as_likely_as_independent_fits() {
             eprintln!("{row}");
             gain += row["ours"].as_f64().unwrap() - row["independent"].as_f64().unwrap();
         }
-        // Mean log-likelihood a normal over two maps and two levels. In a single block, which of its many local optima
-        // either program ends in is luck, so rows are not compared one by one. Seeds are fixed.
+        // Mean log-likelihood a normal over two maps and two levels. In a single block, which of its many
+        // local optima either program ends in is luck, so rows are not compared one by one. Seeds are fixed.
         assert!(gain >= 0.0, "{method}: {gain}");
     }
 }
@@ -146,8 +146,9 @@ fn truth_agrees_with_mitsuba() {
     for row in rows.as_array().unwrap() {
         eprintln!("{row}");
         let [mean, l2, noise] = ["mean", "l2", "noise"].map(|key| row[key].as_f64().unwrap());
-        // 1296 pixels of independent noise: the norm of the difference strays by 1/sqrt(2592) = 2 % of itself, but the
-        // bright ones weigh most; 15 % leaves room for them. The mean of all strays by noise/36, times the same.
+        // 1296 pixels of independent noise: the norm of the difference strays by 1/sqrt(2592) = 2 % of
+        // itself, but the bright ones weigh most; 15 % leaves room for them. The mean of all strays by
+        // noise/36, times the same.
         assert!(l2 < 1.15 * noise, "{row}");
         assert!(mean < 4.5 * noise / 36.0, "{row}");
     }

@@ -26,7 +26,8 @@ fn environments_light_scenes_and_turn() {
         // The truth's noise is 0.04 a pixel, and less of the whole.
         assert!((error["brightness"].as_f64().unwrap() - 1.0).abs() < 0.04, "{method}: {error}");
     }
-    // A turned film: its first frame is the environment as it is, its last is turned half around; and so for the other technique.
+    // A turned film: its first frame is the environment as it is, its last is turned half around; and so for
+    // the other technique.
     let film = picture("film.exr");
     for how in ["prefiltered", "harmonics"] {
         let turning = [

@@ -1,4 +1,5 @@
-//! Pictures of built-in scenes against the truth, as Tan et al. 2005 measure theirs, and of real maps, where there are any.
+//! Pictures of built-in scenes against the truth, as Tan et al. 2005 measure theirs, and of real maps, where
+//! there are any.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
 
@@ -21,9 +22,9 @@ fn colour(methods: &Value, method: &str) -> f64 {
 
 #[test]
 fn colour_errors_are_below_the_papers() {
-    // Tan et al. 2005, section 5: 0.060 for the disk, 0.041 for it at an oblique angle, 0.058 for the armour; their truth
-    // had 16 rays a pixel. And lobes are ahead of what they were published against: ratios of 0.29 to 0.66 with 256 rays (docs/scenes.md), to
-    // which this truth's noise, common to both, adds some.
+    // Tan et al. 2005, section 5: 0.060 for the disk, 0.041 for it at an oblique angle, 0.058 for the armour;
+    // their truth had 16 rays a pixel. And lobes are ahead of what they were published against: ratios of
+    // 0.29 to 0.66 with 256 rays (docs/scenes.md), to which this truth's noise, common to both, adds some.
     for (scene, time, paper, against) in [
         ("disk", "0.15", 0.060, "toksvig"),
         ("disk-oblique", "0", 0.041, "fixed"),

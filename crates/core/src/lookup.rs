@@ -1,7 +1,7 @@
 //! Filtered look-ups: what a texture unit makes of a pyramid at a place, for a pixel of a given reach.
 //!
-//! [`Texels`] has the filters, each once; a [`crate::pyramid::Pyramid`] as stored is one, and [`Lookup`], the same in floats
-//! with the channels of a texel side by side, is the fast one.
+//! [`Texels`] has the filters, each once; a [`crate::pyramid::Pyramid`] as stored is one, and [`Lookup`], the
+//! same in floats with the channels of a texel side by side, is the fast one.
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -39,8 +39,8 @@ pub struct PixelFootprint {
 pub struct Filtering {
     /// Trilinear taps along the longer axis of a pixel's reach, at most; 1 is plain trilinear filtering.
     pub max_taps: usize,
-    /// Cuts the reach into this many parts on both axes, each looked up at a level so much finer: with 2, four times the
-    /// taps, and a kernel nearer to the pixel's square.
+    /// Cuts the reach into this many parts on both axes, each looked up at a level so much finer: with 2,
+    /// four times the taps, and a kernel nearer to the pixel's square.
     pub parts: usize,
     /// Added to the level that the reach asks for; negative is sharper.
     pub lod_bias: f64,
@@ -56,8 +56,9 @@ impl Filtering {
         Self { max_taps, parts: 1, lod_bias: 0.0 }
     }
 
-    /// The same cut in two on both axes. A tent of two texels at the level where a texel is a pixel is far wider than the
-    /// pixel; four tents half as wide are not. It halves the error of every method's pictures (`docs/methods.md`).
+    /// The same cut in two on both axes. A tent of two texels at the level where a texel is a pixel is far
+    /// wider than the pixel; four tents half as wide are not. It halves the error of every method's pictures
+    /// (`docs/methods.md`).
     #[must_use]
     pub const fn fine(max_taps: usize) -> Self {
         Self { max_taps, parts: 2, lod_bias: 0.0 }
@@ -69,8 +70,8 @@ impl Filtering {
 pub enum Sampling {
     /// Our own taps: the same on every device.
     Taps(Filtering),
-    /// The device's sampler, with so many taps at most; 1 is plain trilinear filtering. What comes out is the device's choice; a renderer
-    /// without such a device does what [`Self::filtering`] says.
+    /// The device's sampler, with so many taps at most; 1 is plain trilinear filtering. What comes out is the
+    /// device's choice; a renderer without such a device does what [`Self::filtering`] says.
     Sampler(u16),
 }
 
@@ -90,8 +91,8 @@ impl Sampling {
 pub struct Lookups {
     /// Who filters, and how wide.
     pub sampling: Sampling,
-    /// Shade every texel that the filter reads and mix the results: the reference for lobes that are not aligned, and the
-    /// only way for what cannot be filtered, which takes it unasked.
+    /// Shade every texel that the filter reads and mix the results: the reference for lobes that are not
+    /// aligned, and the only way for what cannot be filtered, which takes it unasked.
     pub neighbours: bool,
     /// Take factors at the lobes' means, as the papers print it.
     pub at_means: bool,
@@ -129,8 +130,8 @@ fn pair(t: f64, n: usize, wrap: Wrap) -> [(usize, f64); 2] {
     // What is not finite, or so far away that floats have no texels there, is as good as anywhere.
     let t = if t.abs() < 1e15 { t } else { 0.0 };
     let t = match wrap {
-        // The part after the point, by way of an integer, which is faster than a call of `floor`. Rounding can make it 1, which
-        // is then the first texel again.
+        // The part after the point, by way of an integer, which is faster than a call of `floor`. Rounding
+        // can make it 1, which is then the first texel again.
         Wrap::Repeat => {
             let part = t - (t as i64) as f64;
             if part < 0.0 { part + 1.0 } else { part }
@@ -187,7 +188,8 @@ pub trait Texels {
 
     /// The texels that a trilinear filter mixes, eight at most, and what it weighs them.
     ///
-    /// What shades each and blends the results shows what filtering should have given, at several times the cost.
+    /// What shades each and blends the results shows what filtering should have given, at several times the
+    /// cost.
     fn neighbours(&self, tap: Tap) -> Vec<Neighbour> {
         let (level, t) = self.levels_of(tap.lod);
         let mut all = Vec::with_capacity(8);
@@ -222,11 +224,11 @@ pub trait Texels {
         }
     }
 
-    /// The trilinear taps, all of one weight, that cover a pixel's reach: along its longer axis, each at the level that
-    /// the shorter axis asks for, or as much coarser as `max_taps` makes it.
+    /// The trilinear taps, all of one weight, that cover a pixel's reach: along its longer axis, each at the
+    /// level that the shorter axis asks for, or as much coarser as `max_taps` makes it.
     ///
-    /// The reach is the ellipse of the pixel's derivatives of `uv`; its axes are found exactly (singular values of the
-    /// 2×2 derivative), not guessed from the longer column.
+    /// The reach is the ellipse of the pixel's derivatives of `uv`; its axes are found exactly (singular
+    /// values of the 2×2 derivative), not guessed from the longer column.
     fn taps(&self, pixel: &PixelFootprint, filtering: Filtering) -> (usize, impl Iterator<Item = Tap>)
     where
         Self: Sized,
@@ -241,13 +243,15 @@ pub trait Texels {
         let major = ((a + c) / 2.0 + spread).sqrt();
         // Their product is the square of det J.
         let minor = if major > 0.0 { dx.perp_dot(dy).abs() / major } else { 0.0 };
-        // The longer axis has twice the angle whose cosine and sine are these: halved by square roots, the larger first.
+        // The longer axis has twice the angle whose cosine and sine are these: halved by square roots, the
+        // larger first.
         let (cos2, sin2) = if spread > 0.0 { (half / spread, b / spread) } else { (1.0, 0.0) };
         let larger = ((1.0 + cos2.abs()) / 2.0).sqrt();
         let smaller = sin2 / (2.0 * larger);
         let axis = if cos2 >= 0.0 { DVec2::new(larger, smaller) } else { DVec2::new(smaller, larger) };
         let parts = filtering.parts.max(1) as f64;
-        // A hundredth over is no reason for another tap: else a round pixel would have one or two by its last digit.
+        // A hundredth over is no reason for another tap: else a round pixel would have one or two by its last
+        // digit.
         let wanted = (major / minor.max(1.0) - 0.01).ceil();
         let long = if wanted.is_finite() { wanted.clamp(1.0, filtering.max_taps.max(1) as f64) } else { 1.0 };
         let long = long * parts;
@@ -286,8 +290,8 @@ pub struct Lookup {
     levels: Vec<Vec<f32>>,
 }
 
-/// Mean of what lies under texel (x, y) of a grid of another size over the same map: area by area, or where that grid is the
-/// finer, of the texels it lies in.
+/// Mean of what lies under texel (x, y) of a grid of another size over the same map: area by area, or where
+/// that grid is the finer, of the texels it lies in.
 #[must_use]
 pub fn area_mean(values: &Grid<[f32; 4]>, size: Size, x: usize, y: usize) -> [f32; 4] {
     let fine = values.size();

@@ -1,7 +1,7 @@
 // Filtered look-ups of a map's layers. Twin of lookup.rs.
 //
-// Levels are mixed here, between two look-ups at whole levels: that is the same on every device, which a sampler's own choice and
-// mix of levels is not.
+// Levels are mixed here, between two look-ups at whole levels: that is the same on every device, which a
+// sampler's own choice and mix of levels is not.
 
 // Where a pixel falls on the map, and how far it reaches.
 struct PixelFootprint {
@@ -40,7 +40,8 @@ struct Taps {
 fn taps(pixel: PixelFootprint, texels: vec2<f32>, filtering: Filtering) -> Taps {
     let dx = pixel.duv_dx * texels;
     let dy = pixel.duv_dy * texels;
-    // Eigenvalues of J Jᵀ, whose ellipse is the image of the pixel's unit circle; their product is the square of det J.
+    // Eigenvalues of J Jᵀ, whose ellipse is the image of the pixel's unit circle; their product is the square
+    // of det J.
     let a = dx.x * dx.x + dy.x * dy.x;
     let b = dx.x * dx.y + dy.x * dy.y;
     let c = dx.y * dx.y + dy.y * dy.y;
@@ -48,7 +49,8 @@ fn taps(pixel: PixelFootprint, texels: vec2<f32>, filtering: Filtering) -> Taps 
     let spread = sqrt(half * half + b * b);
     let major = sqrt((a + c) / 2.0 + spread);
     let minor = abs(dx.x * dy.y - dx.y * dy.x) / max(major, 1e-20);
-    // The longer axis has twice the angle whose cosine and sine are these: halved by square roots, the larger first.
+    // The longer axis has twice the angle whose cosine and sine are these: halved by square roots, the larger
+    // first.
     var double_angle = vec2<f32>(1.0, 0.0);
     if spread > 0.0 {
         double_angle = vec2<f32>(half, b) / spread;
@@ -57,7 +59,8 @@ fn taps(pixel: PixelFootprint, texels: vec2<f32>, filtering: Filtering) -> Taps 
     let smaller = double_angle.y / (2.0 * larger);
     let axis = select(vec2<f32>(smaller, larger), vec2<f32>(larger, smaller), double_angle.x >= 0.0);
     let parts = f32(max(filtering.parts, 1u));
-    // A hundredth over is no reason for another tap: else a round pixel would have one or two by its last digit.
+    // A hundredth over is no reason for another tap: else a round pixel would have one or two by its last
+    // digit.
     let wanted = min(ceil(major / max(minor, 1.0) - 0.01), 1e6);
     let long = clamp(wanted, 1.0, f32(max(filtering.max_taps, 1u))) * parts;
     let lod = log2(max(max(major / long, minor / parts), 1.0)) + filtering.lod_bias;
@@ -120,7 +123,8 @@ struct Neighbour {
     weight: f32,
 }
 
-// Texel i of the eight that a trilinear filter mixes. At the coarsest level the last four have no share, and are not there.
+// Texel i of the eight that a trilinear filter mixes. At the coarsest level the last four have no share, and
+// are not there.
 fn neighbour(map: texture_2d_array<f32>, uv: vec2<f32>, lod: f32, repeat: vec2<bool>, i: u32) -> Neighbour {
     let coarser = i / 4u;
     let level = u32(floor(lod)) + coarser;

@@ -1,7 +1,7 @@
 //! How far two pictures are apart, and how much a moving picture sparkles.
 //!
-//! Pictures are linear RGB, high dynamic range; a *display value* is one of them times the exposure, clipped to 0..1 and
-//! encoded as sRGB. FLIP, the perceptual difference, comes from its own library and is not here.
+//! Pictures are linear RGB, high dynamic range; a *display value* is one of them times the exposure, clipped
+//! to 0..1 and encoded as sRGB. FLIP, the perceptual difference, comes from its own library and is not here.
 
 use glam::Vec3;
 
@@ -23,7 +23,8 @@ pub fn display(colour: Vec3, exposure: f32) -> Vec3 {
     Vec3::from_array((colour * exposure).to_array().map(display_value))
 }
 
-/// `|a - truth| / |truth|` over all pixels and channels of the linear pictures; `|a|` where the truth is black.
+/// `|a - truth| / |truth|` over all pixels and channels of the linear pictures; `|a|` where the truth is
+/// black.
 ///
 /// # Panics
 /// When the pictures differ in size, as in all metrics here.
@@ -48,7 +49,8 @@ pub fn color_error(a: &Picture, truth: &Picture, exposure: f32) -> f64 {
 
 /// Mean absolute change of display values from frame to frame, over all pixels and channels.
 ///
-/// Of two renderings of the same drift, the one that changes more sparkles. `sparkle` is a method's change over the truth's.
+/// Of two renderings of the same drift, the one that changes more sparkles. `sparkle` is a method's change
+/// over the truth's.
 #[must_use]
 pub fn change(frames: &[Picture], exposure: f32) -> f64 {
     let mut sum = 0.0;

@@ -4,7 +4,8 @@ use std::sync::{Mutex, PoisonError};
 
 /// Observer of a piece of work. A closure that takes the fraction done is one that never stops it.
 pub trait Observer: Sync {
-    /// Told that another piece of the work begins, in words such as `bake vmf:4`; progress counts from 0 again.
+    /// Told that another piece of the work begins, in words such as `bake vmf:4`; progress counts from 0
+    /// again.
     fn begin(&self, _work: &str) {}
 
     /// Told what a person may want to know, in a sentence without a full stop.

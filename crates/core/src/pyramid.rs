@@ -75,8 +75,9 @@ impl Precision {
                         }
                     }
                 }
-                // Rounding to nearest reaches infinity from 65520 on. Counting is for the rare case: a running
-                // maximum of the stored magnitudes, which order as their bits do, costs next to nothing.
+                // Rounding to nearest reaches infinity from 65520 on. Counting is for the rare case: a
+                // running maximum of the stored magnitudes, which order as their bits do, costs next to
+                // nothing.
                 let largest = |most: i16, b: &[u8; 2]| most.max(i16::from_le_bytes(*b) & 0x7fff);
                 if out.as_chunks::<2>().0.iter().fold(0, largest) < 0x7c00 {
                     return 0;

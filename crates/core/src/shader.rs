@@ -1,8 +1,9 @@
 //! Shaders: the text that shades a filtered texel, for one method and one lobe.
 //!
-//! Beside each Rust function that a shader needs lies its twin in WGSL, of the same name. Declarations in WGSL may stand in any
-//! order, so linking is concatenation: constants, what all shaders share, the lobe, the method. There are no bindings and no
-//! entry points in it; textures, samplers and parameters come as arguments.
+//! Beside each Rust function that a shader needs lies its twin in WGSL, of the same name. Declarations in
+//! WGSL may stand in any order, so linking is concatenation: constants, what all shaders share, the lobe, the
+//! method. There are no bindings and no entry points in it; textures, samplers and parameters come as
+//! arguments.
 
 use std::fmt::Display;
 
@@ -24,7 +25,8 @@ const SPHERE: &str = include_str!("sphere.wgsl");
 impl Shader {
     /// Text of a method whose texels are shaded in this form, without constants or a table.
     ///
-    /// What the text must hold besides `decode` is said in the file of the form: `ndf/mixture.wgsl` or `ndf/whole.wgsl`.
+    /// What the text must hold besides `decode` is said in the file of the form: `ndf/mixture.wgsl` or
+    /// `ndf/whole.wgsl`.
     #[must_use]
     pub fn new(form: FormKind, sources: &'static [&'static str]) -> Self {
         Self { form, constants: String::new(), entries: 1, sources }
@@ -79,7 +81,8 @@ impl Shader {
 /// Roughnesses for which a [`LobeTable`] holds a lobe's numbers.
 pub const TABLE_ROUGHNESSES: usize = 11;
 
-/// Numbers of a lobe that a method's shader wants, entry by entry: each at [`TABLE_ROUGHNESSES`] roughnesses, and of the diffuse lobe.
+/// Numbers of a lobe that a method's shader wants, entry by entry: each at [`TABLE_ROUGHNESSES`] roughnesses,
+/// and of the diffuse lobe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LobeTable {
     entries: Vec<[f32; TABLE_ROUGHNESSES + 1]>,
@@ -203,8 +206,8 @@ const ENVIRONMENT: [&str; 6] = [
     include_str!("ndf/environment.wgsl"),
 ];
 
-/// The text that lights texels by an environment, to stand beside what [`link`] makes: `reflect_environment`. What the host brings besides is
-/// said in `light/environment/environment.wgsl`.
+/// The text that lights texels by an environment, to stand beside what [`link`] makes: `reflect_environment`.
+/// What the host brings besides is said in `light/environment/environment.wgsl`.
 #[must_use]
 pub fn link_environment(method: &dyn Method, lobe: &dyn Lobe) -> String {
     let own = method.shader();

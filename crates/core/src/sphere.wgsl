@@ -18,7 +18,8 @@ fn sh_ratio(l: f32, m: f32) -> f32 {
     return sqrt((4.0 * l * l - 1.0) / (l * l - m * m));
 }
 
-// One step of the recurrences of real spherical harmonics in l, for one m: the harmonic less its factor of `power`.
+// One step of the recurrences of real spherical harmonics in l, for one m: the harmonic less its factor of
+// `power`.
 struct Harmonic {
     value: f32,
     before: f32,

@@ -46,9 +46,10 @@ pub struct Wraps {
 /// Largest slope on one axis that is kept apart from "vertical": 84 degrees.
 ///
 /// Second moments are ruled by the steepest texels: one of slope 255 (n.z = 1/255, a frequent artefact of
-/// JPEG) outweighs 65 000 of slope 1. On three real maps with such artefacts 10 takes a quarter to two
-/// thirds off the error of `slopes` at the coarsest level against 255, and it costs clean ones nothing (`docs/decisions.md`). A normal at
-/// or below the horizon has no slope at all and gets this one, in its own direction.
+/// JPEG) outweighs 65 000 of slope 1. On three real maps with such artefacts 10 takes a quarter to two thirds
+/// off the error of `slopes` at the coarsest level against 255, and it costs clean ones nothing
+/// (`docs/decisions.md`). A normal at or below the horizon has no slope at all and gets this one, in its own
+/// direction.
 pub const MAX_SLOPE: f32 = 10.0;
 
 /// Slope of a unit normal, each axis held to [`MAX_SLOPE`]: `(-n.x/n.z, -n.y/n.z)`.
@@ -92,7 +93,8 @@ pub struct SurfaceRow {
     pub z: Vec<f32>,
     /// Height; zero where the map has none.
     pub height: Vec<f32>,
-    /// Covariance of the slopes within each texel (xx, yy, xy), around that of its normal; empty where nothing is known of it.
+    /// Covariance of the slopes within each texel (xx, yy, xy), around that of its normal; empty where
+    /// nothing is known of it.
     pub spread: Vec<[f32; 3]>,
 }
 
@@ -185,16 +187,17 @@ pub enum SlopeFilter {
     CentralDifference,
     /// The 3×3 Sobel kernel: smooths across the derivative; OpenImageIO's default.
     Sobel,
-    /// Of the bilinear surface through the heights, mean and covariance over each texel, exactly: what is displaced has those slopes.
+    /// Of the bilinear surface through the heights, mean and covariance over each texel, exactly: what is
+    /// displaced has those slopes.
     Bilinear,
 }
 
-/// Mean slope over a texel of the bilinear surface through the 3 × 3 heights around it, and the covariance (xx, yy, xy), per texel; rows
-/// from above to below, y up.
+/// Mean slope over a texel of the bilinear surface through the 3 × 3 heights around it, and the covariance
+/// (xx, yy, xy), per texel; rows from above to below, y up.
 ///
-/// A texel is a quarter each of the four cells between heights. In a cell, from the height h at its corner on, the surface is
-/// `h + d a + e b + c a b`, so over the quarter `0 <= a, b <= 1/2` the slopes `d + c b` and `e + c a` have means `d + c/4` and `e + c/4`,
-/// variances `c²/48` each, and are not correlated.
+/// A texel is a quarter each of the four cells between heights. In a cell, from the height h at its corner
+/// on, the surface is `h + d a + e b + c a b`, so over the quarter `0 <= a, b <= 1/2` the slopes `d + c b`
+/// and `e + c a` have means `d + c/4` and `e + c/4`, variances `c²/48` each, and are not correlated.
 fn bilinear_slopes(heights: [[f32; 3]; 3]) -> (Vec2, [f32; 3]) {
     let [_, [_, middle, _], _] = heights;
     let mut quarters = [Vec2::ZERO; 4];
@@ -385,7 +388,8 @@ mod tests {
         ];
         let (got, [xx, yy, xy]) = bilinear_slopes(heights);
         for (got, expected) in [got.x, got.y, xx, yy, xy].into_iter().zip(expected) {
-            // The midpoint rule over 64 × 64 places errs by 1/(12 × 64²) of the slopes' own change, which is of order 1.
+            // The midpoint rule over 64 × 64 places errs by 1/(12 × 64²) of the slopes' own change, which is
+            // of order 1.
             assert!((f64::from(got) - expected).abs() < 2e-4, "{got} for {expected}");
         }
     }

@@ -93,7 +93,8 @@ impl From<Exponent> for SlopeVariance {
 }
 
 impl From<LobeAngle> for SlopeVariance {
-    /// `2 sigma²`: the lobe `exp(-beta²/(4 sigma²))` has that variance on each axis (Han et al., section 6.2).
+    /// `2 sigma²`: the lobe `exp(-beta²/(4 sigma²))` has that variance on each axis (Han et al., section
+    /// 6.2).
     fn from(sigma: LobeAngle) -> Self {
         Self(2.0 * sigma.0 * sigma.0)
     }

@@ -10,7 +10,8 @@ pub struct UnknownWord {
     pub known: String,
 }
 
-/// Gives an enum its words: `ALL`, `name`, [`std::fmt::Display`] and [`std::str::FromStr`], which reads what that writes.
+/// Gives an enum its words: `ALL`, `name`, [`std::fmt::Display`] and [`std::str::FromStr`], which reads what
+/// that writes.
 #[macro_export]
 macro_rules! words {
     ($type:ident { $($variant:ident => $word:literal),+ $(,)? }) => {

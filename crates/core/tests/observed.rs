@@ -1,4 +1,5 @@
-//! Long work under an observer: progress runs forwards to its end, and work that is to stop does, whatever the method.
+//! Long work under an observer: progress runs forwards to its end, and work that is to stop does, whatever
+//! the method.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
 

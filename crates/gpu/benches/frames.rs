@@ -1,7 +1,9 @@
-//! Frames: what each method costs on this GPU, and its error; what alignment gains; what brute force costs for the same error.
+//! Frames: what each method costs on this GPU, and its error; what alignment gains; what brute force costs
+//! for the same error.
 //!
-//! Methods take turns in one run, so that ratios hold on a noisy machine; times are medians, by the device's own clock where it has
-//! one. `NDFMAP_BENCH_SIZE` sets the picture's side (default 500), `NDFMAP_BENCH_RUNS` the turns (default 15).
+//! Methods take turns in one run, so that ratios hold on a noisy machine; times are medians, by the device's
+//! own clock where it has one. `NDFMAP_BENCH_SIZE` sets the picture's side (default 500), `NDFMAP_BENCH_RUNS`
+//! the turns (default 15).
 
 use std::time::Instant;
 
@@ -152,7 +154,8 @@ impl Bench<'_> {
                 self.renderer.draw(&parts, &Frame { view: shown, maps, lookups: lookups(name, sampling) })?;
                 let picture = parts.read()?;
                 let error = relative_l2(&picture, &truth.picture);
-                // Noise falls with the root of the samples: so many have as much of it as the method has error.
+                // Noise falls with the root of the samples: so many have as much of it as the method has
+                // error.
                 let samples = truth.rays as f64 * (truth.noise / error).powi(2);
                 println!(
                     "{name:16} {filter:>10} {ms:>8.2} {:>9.2} {:>12.4} {error:>12.3} {:>22.1}",

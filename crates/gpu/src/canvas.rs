@@ -63,7 +63,8 @@ pub(crate) struct PassTarget<'a> {
     pub(crate) keep: Keep,
 }
 
-/// Texture of the caller's own to draw a frame on: its colours, linear radiance, and how they are to be drawn.
+/// Texture of the caller's own to draw a frame on: its colours, linear radiance, and how they are to be
+/// drawn.
 #[derive(Clone, Copy)]
 pub struct Target<'a> {
     /// Colours.
@@ -72,7 +73,8 @@ pub struct Target<'a> {
     pub format: wgpu::TextureFormat,
     /// Depths, `Depth32Float`, 1 at the eye and 0 far away; `None` for depths of the renderer's own.
     pub depth: Option<&'a wgpu::TextureView>,
-    /// Keep what is on the texture (and in the caller's depths) and draw over it; else it is cleared to the scene's background.
+    /// Keep what is on the texture (and in the caller's depths) and draw over it; else it is cleared to the
+    /// scene's background.
     pub keep: bool,
 }
 

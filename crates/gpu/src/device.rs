@@ -60,8 +60,8 @@ impl Device {
         Ok(Self { failure, ..Self::from_wgpu(device, queue) })
     }
 
-    /// The caller's own device, with its queue. Whoever opened it hears of its errors, which we do not listen for; a device with
-    /// [`wgpu::Features::FLOAT32_FILTERABLE`] takes maps of single floats.
+    /// The caller's own device, with its queue. Whoever opened it hears of its errors, which we do not listen
+    /// for; a device with [`wgpu::Features::FLOAT32_FILTERABLE`] takes maps of single floats.
     #[must_use]
     pub fn from_wgpu(device: wgpu::Device, queue: wgpu::Queue) -> Self {
         let info = device.adapter_info();
@@ -149,8 +149,9 @@ impl Device {
         Err(GpuError::Driver { adapter: self.name(), reason })
     }
 
-    /// Runs the entry point `main` of a compute shader, of 64 invocations a group, once for each of `count`: binding 0 is read, 1 is
-    /// written. The shader counts invocations by `id.x + id.y * ROW`. For tests of twins.
+    /// Runs the entry point `main` of a compute shader, of 64 invocations a group, once for each of `count`:
+    /// binding 0 is read, 1 is written. The shader counts invocations by `id.x + id.y * ROW`. For tests of
+    /// twins.
     ///
     /// # Errors
     /// What the driver complains about, an invalid shader included.

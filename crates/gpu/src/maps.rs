@@ -43,7 +43,8 @@ pub(crate) struct BindKey {
     pub(crate) at_means: bool,
     /// Taps of the device's sampler.
     pub(crate) taps: u16,
-    /// What the environment makes of the material: which environment, by its place in memory, and how highlights look it up.
+    /// What the environment makes of the material: which environment, by its place in memory, and how
+    /// highlights look it up.
     pub(crate) environment: Option<Surrounding>,
 }
 
@@ -57,8 +58,9 @@ impl PartialEq for Surrounding {
     }
 }
 
-/// The maps of a scene's materials, baked with one method. Camera, lights, lobes, models and meshes may change after, and colours and
-/// roughness but for this: a material keeps the `textures` that it was baked with, or has none still.
+/// The maps of a scene's materials, baked with one method. Camera, lights, lobes, models and meshes may
+/// change after, and colours and roughness but for this: a material keeps the `textures` that it was baked
+/// with, or has none still.
 pub struct Maps {
     pub(crate) method: AnyMethod,
     pub(crate) materials: Vec<Textures>,

@@ -21,7 +21,8 @@ use crate::pipelines::Pipelines;
 use crate::uniforms::{self, LightUniform, View};
 use crate::{Device, GpuError};
 
-/// A scene as it is now. Its triangles are those of `geometry`; materials, lights and background may have changed since.
+/// A scene as it is now. Its triangles are those of `geometry`; materials, lights and background may have
+/// changed since.
 #[derive(Clone, Copy)]
 pub struct SceneView<'a> {
     /// The scene.
@@ -43,7 +44,8 @@ pub struct Frame<'a> {
     pub lookups: Lookups,
 }
 
-/// Renderer on one device. Keeps what is made for one frame and good for the next: pipelines, samplers, groups, environments.
+/// Renderer on one device. Keeps what is made for one frame and good for the next: pipelines, samplers,
+/// groups, environments.
 pub struct Renderer {
     device: Device,
     /// Number that no other renderer has.
@@ -114,10 +116,11 @@ impl Renderer {
         })
     }
 
-    /// Records a frame, one sample of shading a pixel, into the caller's commands: nothing is submitted, and nothing waited for.
+    /// Records a frame, one sample of shading a pixel, into the caller's commands: nothing is submitted, and
+    /// nothing waited for.
     ///
-    /// What is recorded is the scene as it is now. Materials whose BRDF, colours and environment are those of the last frame take nothing
-    /// from the processor but the look at them.
+    /// What is recorded is the scene as it is now. Materials whose BRDF, colours and environment are those of
+    /// the last frame take nothing from the processor but the look at them.
     ///
     /// # Errors
     /// [`GpuError`] for a shader that does not hold together, or textures that the device cannot hold.
@@ -145,7 +148,8 @@ impl Renderer {
         self.pass(encoder, shown, &Pass { target, view, bindings: &bindings, clock: None })
     }
 
-    /// Draws a picture; [`Canvas::read`] has it. Waits for the picture before, so that no queue grows without end.
+    /// Draws a picture; [`Canvas::read`] has it. Waits for the picture before, so that no queue grows without
+    /// end.
     ///
     /// # Errors
     /// [`GpuError`].
@@ -178,8 +182,8 @@ impl Renderer {
         Ok(())
     }
 
-    /// Draws a frame as an application would, and says how many milliseconds it took: by the device's own clock where it has
-    /// one, else by ours from asking to being done.
+    /// Draws a frame as an application would, and says how many milliseconds it took: by the device's own
+    /// clock where it has one, else by ours from asking to being done.
     ///
     /// # Errors
     /// [`GpuError`].

@@ -1,6 +1,8 @@
-//! Meshes with relief on the GPU: cut anew for each picture, their points and triangles worked out by compute passes.
+//! Meshes with relief on the GPU: cut anew for each picture, their points and triangles worked out by compute
+//! passes.
 //!
-//! A picture costs a plan on the CPU, a pass over the base mesh; what is in memory is bounded by that mesh and the picture's pixels, not by the map.
+//! A picture costs a plan on the CPU, a pass over the base mesh; what is in memory is bounded by that mesh
+//! and the picture's pixels, not by the map.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};

@@ -1,7 +1,9 @@
-//! The truth by the GPU: many pictures of the map as it is, each seen from a little elsewhere in the pixel, added up.
+//! The truth by the GPU: many pictures of the map as it is, each seen from a little elsewhere in the pixel,
+//! added up.
 //!
-//! It tends to what the CPU renderer's truth tends to. Where a sample falls in a pixel is the same for all pixels of a picture, stratified over
-//! 4 × 4 squares; which of the nearest texels it shades is each pixel's own chance.
+//! It tends to what the CPU renderer's truth tends to. Where a sample falls in a pixel is the same for all
+//! pixels of a picture, stratified over 4 × 4 squares; which of the nearest texels it shades is each pixel's
+//! own chance.
 
 use glam::{DVec2, DVec3};
 use ndfmap_core::grid::Grid;
@@ -18,7 +20,8 @@ use crate::{Device, GpuError};
 /// Strata a pixel is cut into on each axis.
 const STRATA: usize = 4;
 
-/// Samples a pixel in the least truth: one through each stratum, for each of two halves whose difference is the noise.
+/// Samples a pixel in the least truth: one through each stratum, for each of two halves whose difference is
+/// the noise.
 pub const LEAST_SAMPLES: usize = 2 * STRATA * STRATA;
 
 /// The finest level of a scene's maps, for the truth.
@@ -47,7 +50,8 @@ pub struct TrueFrame<'a> {
 }
 
 impl Renderer {
-    /// Renders the truth; rays are rounded up to a multiple of [`LEAST_SAMPLES`], and seeds make no difference.
+    /// Renders the truth; rays are rounded up to a multiple of [`LEAST_SAMPLES`], and seeds make no
+    /// difference.
     ///
     /// # Errors
     /// [`GpuError`], and where the observer wants no more.
@@ -68,8 +72,8 @@ impl Renderer {
         let mut halves = [vec![DVec3::ZERO; canvas.size.area()], vec![DVec3::ZERO; canvas.size.area()]];
         let mut done = 0;
         loop {
-            // Doubling where a noise is asked for, so that looking at it costs little; and never so much at once that single floats
-            // lose what is added.
+            // Doubling where a noise is asked for, so that looking at it costs little; and never so much at
+            // once that single floats lose what is added.
             let wanted = if effort.noise > 0.0 { done.max(1) } else { rounds };
             let more = wanted.min(rounds - done).min(MOST_ROUNDS);
             for (half, sums) in halves.iter_mut().enumerate() {

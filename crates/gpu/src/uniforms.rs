@@ -37,14 +37,16 @@ impl View {
     pub(crate) fn new(camera: &Camera, size: Size, geometry: &Geometry) -> Self {
         let rays = camera.rays(size);
         let forward = rays.right.cross(rays.down).normalize_or(DVec3::NEG_Z);
-        // A place p (relative to the eye) at depth p·forward is seen at x = p·right / (right² depth) + middle.x; y alike.
+        // A place p (relative to the eye) at depth p·forward is seen at x = p·right / (right² depth) +
+        // middle.x; y alike.
         let axis = |step: DVec3, pixels: usize| {
             let square = step.length_squared();
             let middle = -rays.corner.dot(step) / square;
             step * (2.0 / (pixels as f64 * square)) + forward * (2.0 * middle / pixels as f64 - 1.0)
         };
         let (x, y) = (axis(rays.right, size.width), -axis(rays.down, size.height));
-        // Nothing is nearer than this; beyond it depths go on for ever. Floats have the same digits for it as for any other.
+        // Nothing is nearer than this; beyond it depths go on for ever. Floats have the same digits for it as
+        // for any other.
         let near = 1e-9 * (geometry.radius + geometry.middle.distance(rays.eye));
         let column = |k: usize| Vec4::new(x[k] as f32, y[k] as f32, 0.0, forward[k] as f32);
         Self {

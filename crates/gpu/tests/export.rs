@@ -79,7 +79,8 @@ fn glslang(language: &str, before: &str, after: &str, arguments: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     for (name, bytes) in shaders {
         let library = String::from_utf8(bytes).unwrap();
-        // Microsoft's compilers take a cast of 0 to an array for its initial value; glslang's HLSL does not know of it.
+        // Microsoft's compilers take a cast of 0 to an array for its initial value; glslang's HLSL does not
+        // know of it.
         let zeroed = |line: &str| {
             line.split_once(" = (").filter(|(_, cast)| cast.ends_with("])0;")).map(|(v, _)| format!("{v};"))
         };
@@ -133,7 +134,8 @@ fn wgsl_is_valid_to_another_front_end() {
 
 #[test]
 fn metal_has_no_bindings_and_our_names() {
-    // There is no compiler for it outside Apple's machines: what can be seen is that it is a library, and called as promised.
+    // There is no compiler for it outside Apple's machines: what can be seen is that it is a library, and
+    // called as promised.
     for (name, bytes) in all("msl") {
         let text = String::from_utf8(bytes).unwrap();
         assert!(text.contains("metal::float3 ndf_shade("), "{name}");

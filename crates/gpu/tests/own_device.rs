@@ -104,13 +104,15 @@ fn a_frame_is_recorded_into_the_callers_commands() {
 
     let texture = texture(&device);
     let own = texture.create_view(&wgpu::TextureViewDescriptor::default());
-    // Twice in the same commands, with the second frame's groups made by the first: nothing of one is lost in the other.
+    // Twice in the same commands, with the second frame's groups made by the first: nothing of one is lost in
+    // the other.
     let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     for _ in 0..2 {
         renderer.record(&mut encoder, &Target::new(&own, texture.format()), &frame).unwrap();
     }
     let drawn = submit_and_read((&device, &queue), encoder, &texture);
-    // Half floats have eleven bits, and a device may cut off the rest: a 1024th at most. Measured 0.0004, where lavapipe cuts.
+    // Half floats have eleven bits, and a device may cut off the rest: a 1024th at most. Measured 0.0004,
+    // where lavapipe cuts.
     let apart = relative_l2(&drawn, &expected);
     assert!(apart < 1.0 / 1024.0, "{apart}");
 

@@ -1,9 +1,11 @@
-//! The twins agree: every method's decoding and shading, and every lobe's functions, on the GPU and on the CPU.
+//! The twins agree: every method's decoding and shading, and every lobe's functions, on the GPU and on the
+//! CPU.
 //!
-//! An output may differ by 1e-5 of itself (the issue of single floats: a chain of some tens of roundings of 6e-8, and `exp` and
-//! `pow`, which devices are allowed 2e-6 for), and by what the exact function would change if its inputs moved by a few of their own
-//! last digits (`INPUT_STEP`). The second is no slack of ours: where a function multiplies such a step, no arithmetic in single floats
-//! can do without, as in `1 - |r|²` of a narrow lobe.
+//! An output may differ by 1e-5 of itself (the issue of single floats: a chain of some tens of roundings of
+//! 6e-8, and `exp` and `pow`, which devices are allowed 2e-6 for), and by what the exact function would
+//! change if its inputs moved by a few of their own last digits (`INPUT_STEP`). The second is no slack of
+//! ours: where a function multiplies such a step, no arithmetic in single floats can do without, as in `1 -
+//! |r|²` of a narrow lobe.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
 
@@ -117,7 +119,8 @@ impl Question<'_> {
         out.extend(&probe.channels);
     }
 
-    /// -1 where the base of the displaced surface turns its back on the eye, as only methods that know of displacement can take.
+    /// -1 where the base of the displaced surface turns its back on the eye, as only methods that know of
+    /// displacement can take.
     fn side(&self, probe: &Probe) -> f32 {
         if self.method.knows_displacement() && probe.below { -1.0 } else { 1.0 }
     }

@@ -24,8 +24,8 @@ use ndfmap_trace::truth::Truth;
 /// A display value may be off by one step of a byte.
 const STEP: f32 = 1.0 / 255.0;
 
-/// Pixels that may be off by more: those in which a triangle's edge passes so near a sample that a rasteriser and a ray
-/// decide otherwise, and those where the number of taps, a whole number, differs for a last digit.
+/// Pixels that may be off by more: those in which a triangle's edge passes so near a sample that a rasteriser
+/// and a ray decide otherwise, and those where the number of taps, a whole number, differs for a last digit.
 const MAY_DIFFER: f64 = 1e-3;
 
 fn staged(name: &str, time: f64, map: usize) -> Scene {
@@ -99,7 +99,8 @@ fn the_truth_is_the_truth() {
         let theirs = truth.render(&scene.camera, size, &effort, &Unobserved).unwrap();
         let apart = relative_l2(&ours.picture, &theirs.picture);
         let expected = ours.noise.hypot(theirs.noise);
-        // The noise of both is itself known to a tenth or so, from one difference of halves over 12 000 pixels of uneven weight.
+        // The noise of both is itself known to a tenth or so, from one difference of halves over 12 000
+        // pixels of uneven weight.
         assert!(apart < 1.25 * expected, "{name}: {apart} apart, noise {} and {}", ours.noise, theirs.noise);
         // A bias would stand out of the noise in the mean over all pixels, which has a hundredth of it.
         let mean =
@@ -125,7 +126,8 @@ fn the_truth_is_the_truth() {
 
 #[test]
 fn the_sampler_is_near_our_taps() {
-    // What samplers do is their own business; but one that is far from a plain trilinear filter would be a bug of ours.
+    // What samplers do is their own business; but one that is far from a plain trilinear filter would be a
+    // bug of ours.
     let Some(device) = device() else { return };
     let (renderer, size) = (Renderer::new(&device).unwrap(), Size { width: 200, height: 200 });
     let scene = staged("disk", 0.3, 256);
@@ -147,7 +149,8 @@ fn the_sampler_is_near_our_taps() {
     let theirs = draw(Sampling::Sampler(1));
     let apart = relative_l2(&theirs, &ours);
     eprintln!("sampler and taps are {apart:.4} apart");
-    // Samplers may take the longer of a pixel's two sides for its reach and mix levels over half the way only: a few hundredths.
+    // Samplers may take the longer of a pixel's two sides for its reach and mix levels over half the way
+    // only: a few hundredths.
     assert!(apart < 0.1, "{apart}");
 }
 
@@ -264,7 +267,8 @@ fn environments_light_as_on_the_cpu() {
         let scene = surrounded(staged("disk", 0.4, 128), environment, technique);
         let share = off_by(&device, &scene, spelling, size);
         eprintln!("{spelling} {environment} {}: {share:.5} off", technique.name());
-        // Twice as many as without an environment: samplers keep eight bits of where between two texels they are, which edges of lamps show.
+        // Twice as many as without an environment: samplers keep eight bits of where between two texels they
+        // are, which edges of lamps show.
         if share > 2.0 * MAY_DIFFER {
             failed.push((spelling, environment, technique, share));
         }

@@ -1,4 +1,5 @@
-//! Attributes: pictures of the map's size (albedo, material weights) whose values each fitted lobe is to carry.
+//! Attributes: pictures of the map's size (albedo, material weights) whose values each fitted lobe is to
+//! carry.
 
 use std::path::Path;
 

@@ -10,7 +10,8 @@ use crate::formats::{read_file, read_image};
 use crate::source::BUILTIN_PREFIX;
 use crate::{Image, MapError, Samples};
 
-/// Where the faces +x, -x, +y, -y, +z, -z are in a picture, in sides of a face, and whether the last is upside down.
+/// Where the faces +x, -x, +y, -y, +z, -z are in a picture, in sides of a face, and whether the last is
+/// upside down.
 struct Layout {
     /// Sides across and down.
     sides: (usize, usize),
@@ -29,7 +30,8 @@ const LAYOUTS: [Layout; 4] = [
 /// Reads an environment, `builtin:NAME` or a file; with it, what was odd but could be lived with.
 ///
 /// # Errors
-/// [`MapError`] for a file that cannot be read, that is of integers (which hold no radiance), or whose sides are those of no known layout.
+/// [`MapError`] for a file that cannot be read, that is of integers (which hold no radiance), or whose sides
+/// are those of no known layout.
 pub fn read_environment(path: &Path) -> Result<(Environment, Vec<String>), MapError> {
     if let Some(name) = path.to_str().and_then(|p| p.strip_prefix(BUILTIN_PREFIX)) {
         let row = builtin::find(name).ok_or_else(|| {

@@ -25,7 +25,8 @@ pub struct Header {
     pub wrap: [String; 2],
     /// What the channels are, such as `sums` or `sums-about-pole`.
     pub encoding: String,
-    /// What each lobe carries besides its normals, layer after layer behind the lobes' own; none for linear methods.
+    /// What each lobe carries besides its normals, layer after layer behind the lobes' own; none for linear
+    /// methods.
     pub attributes: Vec<Attribute>,
     /// What it was baked from.
     pub source: Source,

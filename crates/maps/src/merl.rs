@@ -1,8 +1,9 @@
 //! Measured reflectance in the format of the MERL database (Matusik et al. 2003).
 //!
-//! Three 32-bit counts, 90 × 90 × 180, then as many 64-bit floats for red, for green and for blue, all little-endian. Bins of the half angle
-//! (finer towards the peak), of the difference angle, and of the turn of the difference, the last the fastest. Values are to be scaled by a
-//! number for each channel; those that are negative were never measured.
+//! Three 32-bit counts, 90 × 90 × 180, then as many 64-bit floats for red, for green and for blue, all
+//! little-endian. Bins of the half angle (finer towards the peak), of the difference angle, and of the turn
+//! of the difference, the last the fastest. Values are to be scaled by a number for each channel; those that
+//! are negative were never measured.
 
 use std::path::Path;
 

@@ -31,7 +31,8 @@ impl NdfMap {
         read_ndf(path, &read_file(path)?)?.ok_or_else(plain)
     }
 
-    /// Writes the map to a file, whole or not at all, in the format that its name asks for; returns its length in bytes.
+    /// Writes the map to a file, whole or not at all, in the format that its name asks for; returns its
+    /// length in bytes.
     ///
     /// # Errors
     /// [`MapError`] for a name or options that no format has, and for a file that cannot be written.
@@ -50,11 +51,13 @@ impl NdfMap {
         method_of(path, &self.header)
     }
 
-    /// The map as another method reads it: `slopes:9` what `slopes` has baked, `naive` what `toksvig` has, `sh:4` what `sh:7` has. Lobes
-    /// stay as they were fitted, whatever alignment the method would have asked for.
+    /// The map as another method reads it: `slopes:9` what `slopes` has baked, `naive` what `toksvig` has,
+    /// `sh:4` what `sh:7` has. Lobes stay as they were fitted, whatever alignment the method would have asked
+    /// for.
     ///
     /// # Errors
-    /// [`MapError`] for a method that reads other channels, and for a header that names none; `path` is for its words.
+    /// [`MapError`] for a method that reads other channels, and for a header that names none; `path` is for
+    /// its words.
     pub fn read_by(&self, path: &Path, method: &dyn Method) -> Result<Self, MapError> {
         let own = self.method(path)?;
         if !method.reads(&own.encoding()) {
@@ -126,7 +129,8 @@ impl NdfTexel {
         self.method.lobe_layout()?.attribute(&self.channels, attribute, lobe)
     }
 
-    /// Light that it sends to the eye, linear RGB: every normal of it lit by every light. The material is all of one colour and roughness.
+    /// Light that it sends to the eye, linear RGB: every normal of it lit by every light. The material is all
+    /// of one colour and roughness.
     #[must_use]
     pub fn shade(&self, brdf: &Brdf, params: &SurfaceParams, lights: &[IncidentLight]) -> DVec3 {
         let texel = FilteredTexel {

@@ -1,4 +1,5 @@
-//! MERL files: one made from a published fit is read as what it holds, and others say what is wrong with them.
+//! MERL files: one made from a published fit is read as what it holds, and others say what is wrong with
+//! them.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
 
@@ -53,7 +54,8 @@ fn a_table_is_read_as_what_it_holds() {
     assert_eq!(missing, below + 1);
     let built_in = "sgd:gold-metallic-paint".parse::<AnyLobe>().unwrap();
     let (a, b) = (read.measured().unwrap(), built_in.measured().unwrap());
-    // The built-in one takes sixteen turns of the difference where the file has 180, of a fit that hardly depends on them.
+    // The built-in one takes sixteen turns of the difference where the file has 180, of a fit that hardly
+    // depends on them.
     assert!((a.diffuse - b.diffuse).length() < 0.02 * b.diffuse.length(), "{} {}", a.diffuse, b.diffuse);
     for u in [1.0, 0.99, 0.95, 0.8] {
         let (f, g) = (read.evaluate(u), built_in.evaluate(u));

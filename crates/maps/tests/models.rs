@@ -27,7 +27,8 @@ const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\npr
     property float s\nproperty float t\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
     -1 -1 0 0 0\n1 -1 0 1 0\n1 1 0 1 1\n-1 1 0 0 1\n4 0 1 2 3\n";
 
-/// The same square as glTF: positions, coordinates (v down), indices, a two by one normal map and a base colour.
+/// The same square as glTF: positions, coordinates (v down), indices, a two by one normal map and a base
+/// colour.
 fn gltf() -> Vec<u8> {
     let floats: [f32; 20] =
         [-1., -1., 0., 1., -1., 0., 1., 1., 0., -1., 1., 0., 0., 1., 1., 1., 1., 0., 0., 0.];

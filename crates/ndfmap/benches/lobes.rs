@@ -1,8 +1,8 @@
-//! What fitted lobes cost and gain: seconds and nanoseconds a texel by map size, and errors against Toksvig's, at
-//! texels and between them, over several maps; medians in one table.
+//! What fitted lobes cost and gain: seconds and nanoseconds a texel by map size, and errors against
+//! Toksvig's, at texels and between them, over several maps; medians in one table.
 //!
-//! `NDFMAP_BENCH_SIZE` is the largest side timed (default 4096), `NDFMAP_BENCH_RUNS` the turns (default 3). With
-//! `NDFMAP_BENCH_MAPS` naming a folder, normal maps in it are measured beside the built-in ones.
+//! `NDFMAP_BENCH_SIZE` is the largest side timed (default 4096), `NDFMAP_BENCH_RUNS` the turns (default 3).
+//! With `NDFMAP_BENCH_MAPS` naming a folder, normal maps in it are measured beside the built-in ones.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;

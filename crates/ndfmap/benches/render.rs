@@ -1,8 +1,10 @@
-//! Pictures: what a filtered one costs against a truth of 256 rays a pixel at equal settings, in one thread, and its error.
+//! Pictures: what a filtered one costs against a truth of 256 rays a pixel at equal settings, in one thread,
+//! and its error.
 //!
-//! Truth and methods take turns in one run, and ratios are between medians. `NDFMAP_BENCH_SIZE` sets the picture's side
-//! (default 250; the truth is timed at a quarter of the rays and scaled, as every ray costs the same), `NDFMAP_BENCH_RUNS`
-//! the turns (default 3). The second table shows what time depends on: pixels, and hardly the size of the map.
+//! Truth and methods take turns in one run, and ratios are between medians. `NDFMAP_BENCH_SIZE` sets the
+//! picture's side (default 250; the truth is timed at a quarter of the rays and scaled, as every ray costs
+//! the same), `NDFMAP_BENCH_RUNS` the turns (default 3). The second table shows what time depends on: pixels,
+//! and hardly the size of the map.
 
 use std::time::Instant;
 

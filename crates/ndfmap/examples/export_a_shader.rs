@@ -1,4 +1,5 @@
-//! Writes the shader of a method and a lobe: `cargo run --release -p ndfmap --features shaders --example export_a_shader [LANGUAGE]`.
+//! Writes the shader of a method and a lobe: `cargo run --release -p ndfmap --features shaders --example
+//! export_a_shader [LANGUAGE]`.
 
 use ndfmap::core::brdf::{Brdf, Ggx, ShadingModel};
 use ndfmap::core::ndf::Vmf;

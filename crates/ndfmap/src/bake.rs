@@ -17,7 +17,8 @@ use serde::Serialize;
 use crate::Error;
 use crate::choose::Choice;
 
-/// Bake of a source by a method, put together, then [saved](BakeJob::save) or [kept in memory](BakeJob::to_map).
+/// Bake of a source by a method, put together, then [saved](BakeJob::save) or [kept in
+/// memory](BakeJob::to_map).
 #[derive(Clone)]
 pub struct BakeJob<'a> {
     map: &'a SourceMap,
@@ -130,7 +131,8 @@ impl<'a> BakeJob<'a> {
     /// Bakes into memory.
     ///
     /// # Errors
-    /// [`Error::Request`] for attributes that do not fit or channels too large for the precision, and [`Error::Cancelled`].
+    /// [`Error::Request`] for attributes that do not fit or channels too large for the precision, and
+    /// [`Error::Cancelled`].
     pub fn to_map(&self) -> Result<NdfMap, Error> {
         self.check()?;
         let values: Vec<_> = self.attributes.iter().map(|a| a.values.clone()).collect();

@@ -1,7 +1,8 @@
-//! A choice of method: bakes a map with every candidate, measures each against the truth, and says which one to take.
+//! A choice of method: bakes a map with every candidate, measures each against the truth, and says which one
+//! to take.
 //!
-//! What is measured is what a viewer meets: the error between texels, where a filter mixes, at levels 3 and 6, on the map
-//! as it would be stored. A candidate's error is the worse of the two levels.
+//! What is measured is what a viewer meets: the error between texels, where a filter mixes, at levels 3 and
+//! 6, on the map as it would be stored. A candidate's error is the worse of the two levels.
 
 use ndfmap_core::bake::Bake;
 use ndfmap_core::brdf::Lobe;
@@ -88,7 +89,8 @@ impl Auto<'_> {
     /// Measures and chooses.
     ///
     /// # Errors
-    /// [`Error::Failed`] where no candidate is within the limit, [`Error::Request`] for a map of one texel, and [`Error::Cancelled`].
+    /// [`Error::Failed`] where no candidate is within the limit, [`Error::Request`] for a map of one texel,
+    /// and [`Error::Cancelled`].
     pub fn choose(&self, limit: Limit, observer: &dyn Observer) -> Result<Choice, Error> {
         let sizes = level_sizes(self.surface.size());
         let last = sizes.iter().rposition(|s| s.area() > 1).ok_or_else(|| {

@@ -1,8 +1,12 @@
-//! ndfmap: normal distribution maps from files to pictures, all that the program `ndfmap` does, by typed functions.
+//! ndfmap: normal distribution maps from files to pictures, all that the program `ndfmap` does, by typed
+//! functions.
 //!
-//! - [`maps`] reads sources and baked maps; [`BakeJob`] bakes one into the other, and [`choose`] finds the method for a map.
-//! - [`compare`] measures methods on a map, [`render`] renders scenes through baked maps and by brute force, [`report`] draws both.
-//! - [`core`] has the mathematics, [`trace`] the CPU renderer, and `gpu` (a feature) the same in real time, and shaders for other programs.
+//! - [`maps`] reads sources and baked maps; [`BakeJob`] bakes one into the other, and [`choose`] finds the
+//!   method for a map.
+//! - [`compare`] measures methods on a map, [`render`] renders scenes through baked maps and by brute force,
+//!   [`report`] draws both.
+//! - [`core`] has the mathematics, [`trace`] the CPU renderer, and `gpu` (a feature) the same in real time,
+//!   and shaders for other programs.
 //!
 //! Long work takes an [`Observer`](core::observe::Observer), who is told how far it is and may stop it.
 //!

@@ -95,7 +95,8 @@ impl SceneSpec {
     /// The scene at a time from 0 to 1. What a model's reader warns of, the observer is told.
     ///
     /// # Errors
-    /// [`Error::Map`] for a model that cannot be read, and [`Error::Request`] for a displacement that does not fit.
+    /// [`Error::Map`] for a model that cannot be read, and [`Error::Request`] for a displacement that does
+    /// not fit.
     pub fn build(&self, time: f64, observer: &dyn Observer) -> Result<Scene, Error> {
         let mut staging = SceneOptions { time, map: self.map.clone(), ..SceneOptions::default() };
         if let Some(size) = self.map_size {

@@ -11,7 +11,8 @@ pub(crate) const STEPS: usize = 16;
 /// Cells of a pixel.
 pub(crate) const CELLS: usize = STEPS * STEPS;
 
-/// Rows of pixels whose cells are worked out together: cells are many, and those between two bands are worked out twice.
+/// Rows of pixels whose cells are worked out together: cells are many, and those between two bands are worked
+/// out twice.
 pub(crate) const BAND: usize = 8;
 
 /// Frames of a drift, from the camera where it is to a whole pixel on.
@@ -23,22 +24,24 @@ pub fn drifted(camera: &Camera, frame: usize) -> Camera {
     Camera { shift: camera.shift - DVec2::splat(frame as f64 / STEPS as f64), ..*camera }
 }
 
-/// The cells that pixels of all frames are made of: [`STEPS`] a pixel on each axis, and a pixel more than the picture.
+/// The cells that pixels of all frames are made of: [`STEPS`] a pixel on each axis, and a pixel more than the
+/// picture.
 pub(crate) fn cells(size: Size) -> Size {
     Size { width: (size.width + 1) * STEPS, height: (size.height + 1) * STEPS }
 }
 
 /// A camera whose pixels are those cells.
 pub(crate) fn cell_camera(camera: &Camera, size: Size) -> Camera {
-    // The angle of view grows by the added pixel; the middle moves by half of it, and the eye looks where it looked.
+    // The angle of view grows by the added pixel; the middle moves by half of it, and the eye looks where it
+    // looked.
     let tangent = (camera.degrees.to_radians() / 2.0).tan() * (size.height + 1) as f64 / size.height as f64;
     let half = STEPS as f64 / 2.0;
     let shift = camera.shift * STEPS as f64 - DVec2::splat(half);
     Camera { degrees: 2.0 * tangent.atan().to_degrees(), shift, ..*camera }
 }
 
-/// Every frame from the cells' radiance: a pixel is the mean of the cells it covers, so frames differ by what enters and
-/// leaves, and by nothing that is mere chance in between.
+/// Every frame from the cells' radiance: a pixel is the mean of the cells it covers, so frames differ by what
+/// enters and leaves, and by nothing that is mere chance in between.
 pub(crate) fn frames(cells: &[DVec3], size: Size) -> Vec<Picture> {
     let width = (size.width + 1) * STEPS;
     // Sums over everything above and to the left: any rectangle is four of them.

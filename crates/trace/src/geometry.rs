@@ -18,8 +18,9 @@ pub struct Geometry {
     stretches: Vec<[Mat2; 3]>,
     /// `None` for a scene without triangles.
     hierarchy: Option<CwBvh>,
-    /// A sphere around everything. Boxes are in single floats, so they and the rays are taken from its middle, and rays
-    /// from where they enter it: however far away the scene or the eye may be, digits go to what is between.
+    /// A sphere around everything. Boxes are in single floats, so they and the rays are taken from its
+    /// middle, and rays from where they enter it: however far away the scene or the eye may be, digits go to
+    /// what is between.
     middle: DVec3,
     radius: f64,
 }
@@ -60,7 +61,8 @@ pub struct Place {
 }
 
 impl Geometry {
-    /// Builds the hierarchy. Meshes with relief are not displaced; their places still say how slopes lie on them, as bump maps want.
+    /// Builds the hierarchy. Meshes with relief are not displaced; their places still say how slopes lie on
+    /// them, as bump maps want.
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
         Self::of(scene, &scene.objects)
@@ -149,9 +151,10 @@ impl Geometry {
 
     /// What lies where a ray of this direction hit.
     ///
-    /// Seen from behind, a surface shows its back, frame turned about the tangent. Where the normal between corners has turned
-    /// away from an eye that the triangle itself faces, it is bent back until it just does not: else there would be holes. Not so
-    /// where `unbent`: facets of relief may be seen where the base mesh is not.
+    /// Seen from behind, a surface shows its back, frame turned about the tangent. Where the normal between
+    /// corners has turned away from an eye that the triangle itself faces, it is bent back until it just does
+    /// not: else there would be holes. Not so where `unbent`: facets of relief may be seen where the base
+    /// mesh is not.
     #[must_use]
     pub fn place(&self, hit: &Hit, direction: DVec3, unbent: bool) -> Place {
         let Triangle { corners: [a, b, c], object, material } = &self.triangles[hit.triangle as usize];
@@ -165,7 +168,8 @@ impl Geometry {
         let facing = -normal.dot(direction);
         let stretch = self.stretches.get(hit.triangle as usize).map(|[p, q, u]| {
             let stretch = (*p).as_dmat2() * r + (*q).as_dmat2() * s + (*u).as_dmat2() * t;
-            // From behind, what stands out goes in, along the turned frame: only the slope along the tangent changes its sign.
+            // From behind, what stands out goes in, along the turned frame: only the slope along the tangent
+            // changes its sign.
             DMat2::from_diagonal(DVec2::new(side, 1.0)) * stretch
         });
         let stretch = stretch.filter(|stretch| stretch.is_finite());
@@ -213,8 +217,8 @@ fn face([a, b, c]: &[Vertex; 3]) -> DVec3 {
     (b.position - a.position).as_dvec3().cross((c.position - a.position).as_dvec3()).normalize_or(DVec3::Y)
 }
 
-/// Distance and the weights of the second and third corner (Möller and Trumbore 1997), in f64, where cracks between
-/// triangles are too narrow to be found by chance.
+/// Distance and the weights of the second and third corner (Möller and Trumbore 1997), in f64, where cracks
+/// between triangles are too narrow to be found by chance.
 pub(crate) fn intersect([a, b, c]: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<(f64, DVec2)> {
     let (p, q) = (b - a, c - a);
     let across = direction.cross(q);

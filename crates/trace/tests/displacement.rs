@@ -31,7 +31,8 @@ const ONE: Size = Size { width: 1, height: 1 };
 /// Tiles of the map on a side of the plane.
 const TILES: f64 = 6.0;
 
-/// A plane of many tiles at z = 0, a tile wide each, seen from afar along `wo` by a picture a few tiles wide, lit along `wi`.
+/// A plane of many tiles at z = 0, a tile wide each, seen from afar along `wo` by a picture a few tiles wide,
+/// lit along `wi`.
 fn plane(surface: Arc<dyn Surface>, brdf: Brdf, diffuse: f64, directions: &Directions) -> Scene {
     let place = |s: f64, t: f64| DVec3::new(s - 0.5, t - 0.5, 0.0) * TILES;
     let mesh = Mesh::from_patch((6, 6), DVec2::splat(TILES), place);
@@ -99,7 +100,8 @@ fn coarsest(surface: &dyn Surface, method: &dyn Method) -> Vec<f32> {
     pyramid.texel(pyramid.sizes().len() - 1, 0, 0)
 }
 
-/// A tiling surface of waves of some ten texels, many enough to be Gaussian, whose slopes have these deviations.
+/// A tiling surface of waves of some ten texels, many enough to be Gaussian, whose slopes have these
+/// deviations.
 fn gaussian(deviations: DVec2, seed: u64) -> HeightField {
     const SIDE: usize = 384;
     let mut random = Pcg64Mcg::seed_from_u64(seed);
@@ -171,7 +173,8 @@ fn lights(wi: DVec3) -> Vec<Light> {
     (0..37).map(light).collect()
 }
 
-/// Relative L2 error of LEADR over all ways, diffuse and with this specular lobe, for slopes of these deviations.
+/// Relative L2 error of LEADR over all ways, diffuse and with this specular lobe, for slopes of these
+/// deviations.
 fn errors(deviations: DVec2, lobe: &str, surfaces: u64, rays: usize) -> [f64; 2] {
     let method = "slopes:9".parse::<AnyMethod>().unwrap();
     let mut all =
@@ -205,7 +208,8 @@ fn leadr_is_exact_on_gaussian_surfaces() {
     for deviations in [DVec2::splat(0.25), DVec2::new(0.5, 0.1)] {
         let [diffuse, specular] = errors(deviations, "beckmann:0.1", 3, 4096);
         println!("{deviations}: diffuse {diffuse:.4}, specular {specular:.4}");
-        // What the paper's "exact" is held to here. Chance leaves some 0.01 in three surfaces of 4096 rays a way.
+        // What the paper's "exact" is held to here. Chance leaves some 0.01 in three surfaces of 4096 rays a
+        // way.
         assert!(diffuse < 0.03 && specular < 0.03, "{deviations}: {diffuse} {specular}");
     }
 }
@@ -225,7 +229,8 @@ fn leadr_on_gaussian_surfaces_of_many_deviations() {
 
 #[test]
 fn a_groove_displaced_is_its_two_flanks_as_seen() {
-    // A saw of flanks at slopes ±1/2: the eye above sees both whole; from 40 degrees, each by its projected area.
+    // A saw of flanks at slopes ±1/2: the eye above sees both whole; from 40 degrees, each by its projected
+    // area.
     let side = 32;
     let saw = |x: usize| if x < side / 2 { x as f32 } else { (side - x) as f32 };
     let heights = Grid::from_fn(Size { width: side, height: side }, |x, _| saw(x) / side as f32 * 0.5);
@@ -244,8 +249,8 @@ fn a_groove_displaced_is_its_two_flanks_as_seen() {
         let lit = flanks.map(|n| 0.8 / PI * n.normalize().dot(directions.wi).max(0.0));
         let expected = (seen[0] * lit[0] + seen[1] * lit[1]) / (seen[0] + seen[1]);
         let got = by_rays(&scene, 8192);
-        // Which flank a ray meets is chance: half of 1/sqrt(8192) at most of what parts them, 4.5 times; strata do better. Corners at the
-        // top of a texel are cut by facets half as wide: none.
+        // Which flank a ray meets is chance: half of 1/sqrt(8192) at most of what parts them, 4.5 times;
+        // strata do better. Corners at the top of a texel are cut by facets half as wide: none.
         let chance = 4.5 * 0.5 * (lit[0] - lit[1]).abs() / 8192_f64.sqrt();
         assert!((got - expected).abs() < chance + 1e-6, "{got} for {expected}");
     }
@@ -253,8 +258,9 @@ fn a_groove_displaced_is_its_two_flanks_as_seen() {
 
 #[test]
 fn shadows_take_what_the_relief_stands_before() {
-    // Light from 20 degrees above the horizon along x, on the same saw with flanks of slope ±1: the far flank and part of the near one are
-    // in shadow; from above, what is lit is the near flank down to where the ray over the ridge meets it.
+    // Light from 20 degrees above the horizon along x, on the same saw with flanks of slope ±1: the far flank
+    // and part of the near one are in shadow; from above, what is lit is the near flank down to where the ray
+    // over the ridge meets it.
     let side = 64;
     let saw = |x: usize| if x < side / 2 { x as f32 } else { (side - x) as f32 };
     let heights = Grid::from_fn(Size { width: side, height: side }, |x, _| saw(x) / side as f32);
@@ -265,8 +271,9 @@ fn shadows_take_what_the_relief_stands_before() {
     let brdf = Brdf { lobe: "lambert".parse::<AnyLobe>().unwrap(), shading: ShadingModel::Shadowed };
     let mut scene = plane(Arc::new(surface), brdf, 0.8, &directions);
     scene.displace(1.0, true).unwrap();
-    // A ridge of height 1/2 every 1, flanks of slope 1. Down the flank that faces the light from a ridge at 0 (height 1/2 - x), light comes
-    // over the ridge at 1 with slope tan e: above it, z > 1/2 - (1 - x) tan e. They meet at x = tan e / (1 + tan e).
+    // A ridge of height 1/2 every 1, flanks of slope 1. Down the flank that faces the light from a ridge at 0
+    // (height 1/2 - x), light comes over the ridge at 1 with slope tan e: above it, z > 1/2 - (1 - x) tan e.
+    // They meet at x = tan e / (1 + tan e).
     let tan = elevation.tan();
     let lit = tan / (1.0 + tan);
     let expected = lit * 0.8 / PI * DVec3::new(1.0, 0.0, 1.0).normalize().dot(wi);
@@ -302,7 +309,8 @@ fn builtin_maps_have_the_slopes_that_are_displaced() {
         let method = "slopes".parse::<AnyMethod>().unwrap();
         let texel = coarsest(&*scene.materials[0].surface, &*method);
         let scale = second[0] + second[1];
-        // Twenty thousand slopes leave a percent; facets half a texel wide have 1/24 of the texel's own bend less than the surface.
+        // Twenty thousand slopes leave a percent; facets half a texel wide have 1/24 of the texel's own bend
+        // less than the surface.
         for (got, baked) in [mean.x, mean.y].into_iter().zip(&texel[1..3]) {
             assert!((got - f64::from(*baked)).abs() < 0.03 * scale.sqrt(), "{name}: {mean} {texel:?}");
         }
@@ -314,8 +322,9 @@ fn builtin_maps_have_the_slopes_that_are_displaced() {
 
 #[test]
 fn silhouettes_are_defined_over_a_full_turn() {
-    // Specular facets lit from the eye: whatever is seen sends something back. As printed, but without the artificial normal, mean normals
-    // that face away at the silhouette divide by nothing, or by less (the paper's figure 6).
+    // Specular facets lit from the eye: whatever is seen sends something back. As printed, but without the
+    // artificial normal, mean normals that face away at the silhouette divide by nothing, or by less (the
+    // paper's figure 6).
     let size = Size { width: 96, height: 96 };
     let staging = SceneOptions { map_size: Size { width: 256, height: 256 }, ..SceneOptions::default() };
     let mut scene = (scene::find("noise-sphere").unwrap().build)(&staging);

@@ -1,4 +1,5 @@
-//! Light from everywhere, where the answer is known: white skies, skies of one direction, and integrals worked out apart.
+//! Light from everywhere, where the answer is known: white skies, skies of one direction, and integrals
+//! worked out apart.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
 
@@ -30,8 +31,8 @@ fn inside(mut scene: Scene, environment: Environment, technique: Technique) -> S
     scene
 }
 
-/// `∫ L(wi) facet(n, wi, wo) dwi` for an eye straight above, by Gauss-free brute force: a lattice over half-vectors, which are where facets
-/// are narrow, and one over directions for the diffuse part.
+/// `∫ L(wi) facet(n, wi, wo) dwi` for an eye straight above, by Gauss-free brute force: a lattice over
+/// half-vectors, which are where facets are narrow, and one over directions for the diffuse part.
 fn integral(scene: &Scene, n: DVec3, sky: &dyn Fn(DVec3) -> DVec3) -> DVec3 {
     let material = &scene.materials[0];
     let brdf = &material.brdf;
@@ -107,9 +108,10 @@ fn every_lobe_is_right_in_a_furnace() {
                 for method in ["fixed", "toksvig", "vmf:2", "gmm:2", "sh:7", "slopes:32"] {
                     let got = mean(&filtered(&scene, method, SQUARE, Lookups::TRILINEAR));
                     let apart = (got - expected).length() / expected.length();
-                    // A table of 16 × 16, and of harmonics what order 8 leaves of a half-space of half-vectors: 1 %. Slopes are a grid
-                    // to three deviations, which holds all but 1 % of a Gaussian; of a wide lobe that is none, the factor
-                    // `4 u c` differs between where the grid is and where the lobe is.
+                    // A table of 16 × 16, and of harmonics what order 8 leaves of a half-space of
+                    // half-vectors: 1 %. Slopes are a grid to three deviations, which holds all but 1 % of a
+                    // Gaussian; of a wide lobe that is none, the factor `4 u c` differs between where the
+                    // grid is and where the lobe is.
                     let bound = match (method, spelling.split(':').next()) {
                         ("slopes:32", Some("beckmann" | "lambert"))
                         | ("fixed" | "toksvig" | "vmf:2" | "gmm:2" | "sh:7", _) => 0.012,
@@ -147,7 +149,8 @@ fn one_direction_is_a_directional_light() {
         let sky = inside(plate(map("foil", 32), lobe, shading, 4.0), one.clone(), Technique::Prefiltered);
         for method in ["vmf:4", "slopes", "toksvig"] {
             let by = |scene| filtered(scene, method, Size { width: 24, height: 24 }, Lookups::TRILINEAR);
-            // All but 50 times the mean, 50/131072 of it, shines as a light; a light sees facets from above the base surface only.
+            // All but 50 times the mean, 50/131072 of it, shines as a light; a light sees facets from above
+            // the base surface only.
             let apart = relative_l2(&by(&sky), &by(&lit));
             assert!(apart < 0.005, "{method} {lobe}: {apart}");
         }
@@ -166,7 +169,8 @@ fn one_direction_is_a_directional_light() {
 
 #[test]
 fn truth_is_the_integral() {
-    // One pixel that sees a whole map, under a sky with lamps: the mean over texels of the integral over the sky.
+    // One pixel that sees a whole map, under a sky with lamps: the mean over texels of the integral over the
+    // sky.
     let surface = map("foil", 8);
     let studio = builtin::find("studio").unwrap().build();
     for (lobe, shading) in [
@@ -186,7 +190,8 @@ fn truth_is_the_integral() {
         let true_picture = truth(&scene, Size { width: 1, height: 1 }, 1 << 17, 5);
         let got = mean(&true_picture.picture);
         let apart = (got - expected).length() / expected.length();
-        // Four deviations of the noise, itself known from one difference only, and the lattice's own at the lamps' edges.
+        // Four deviations of the noise, itself known from one difference only, and the lattice's own at the
+        // lamps' edges.
         assert!(
             apart < 4.0 * true_picture.noise + 0.004,
             "{lobe}: {got} {expected}, noise {}",
@@ -197,7 +202,8 @@ fn truth_is_the_integral() {
 
 #[test]
 fn nothing_rings_black_or_burns_out_beside_a_sun() {
-    // A sun 100 000 times the mean: every pixel of a lit plate has light, by either technique, as the truth has.
+    // A sun 100 000 times the mean: every pixel of a lit plate has light, by either technique, as the truth
+    // has.
     for technique in Technique::ALL {
         let sky = builtin::find("sky").unwrap().build();
         let scene = inside(plate(map("foil", 32), "ggx:0.3", ShadingModel::Smith, 4.0), sky, technique);

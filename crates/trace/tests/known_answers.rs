@@ -1,4 +1,5 @@
-//! Scenes whose answers are known: closed forms, and plain means over the map worked out apart from the renderer.
+//! Scenes whose answers are known: closed forms, and plain means over the map worked out apart from the
+//! renderer.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
 
@@ -114,7 +115,8 @@ fn a_v_groove_far_away_is_the_mean_of_its_flanks() {
         let facet = |n| material.brdf.facet(n, &material.params, &directions);
         let expected = (facet(a) + facet(b)) / 2.0;
         let one = Size { width: 1, height: 1 };
-        // Chance puts 0.5/sqrt(32768) = 0.28 % too much on a flank; flanks differ by at most twice their mean; 4.5 deviations.
+        // Chance puts 0.5/sqrt(32768) = 0.28 % too much on a flank; flanks differ by at most twice their
+        // mean; 4.5 deviations.
         let brute = truth(&scene, one, 1 << 15, 0).picture.texels()[0].as_dvec3();
         assert!(
             (brute - expected).length() < 0.025 * expected.length(),
@@ -130,7 +132,8 @@ fn a_v_groove_far_away_is_the_mean_of_its_flanks() {
 
 #[test]
 fn a_plane_far_away_is_the_mean_over_the_map() {
-    // Forty independent truths: their mean lies within 4.5 standard errors of the exact mean in all but one of 10⁵ tries.
+    // Forty independent truths: their mean lies within 4.5 standard errors of the exact mean in all but one
+    // of 10⁵ tries.
     for (name, lobe, shading) in [
         ("foil", "blinn-phong:50", ShadingModel::Han),
         ("armour", "ggx:0.2", ShadingModel::Smith),
@@ -161,7 +164,8 @@ fn the_noise_told_is_the_noise_there_is() {
     for rays in [32, 128] {
         let told = truth(&scene, size, rays, 2);
         let real = relative_l2(&told.picture, &best);
-        // Noise over 48² pixels of which the brightest hundred matter: an estimate of 10 to 20 %, and best is not perfect.
+        // Noise over 48² pixels of which the brightest hundred matter: an estimate of 10 to 20 %, and best is
+        // not perfect.
         assert!(real / told.noise > 0.6 && real / told.noise < 1.6, "{rays}: told {}, is {real}", told.noise);
     }
     let geometry = Geometry::new(&scene);
@@ -309,7 +313,8 @@ fn scenes_far_from_everything_have_no_holes() {
 
 #[test]
 fn a_surface_shows_its_back() {
-    // A diffuse plate between light and eye is lit on the side that the eye does not see, and one seen from behind is lit there.
+    // A diffuse plate between light and eye is lit on the side that the eye does not see, and one seen from
+    // behind is lit there.
     let mut scene = plate(map("v-groove", 16), "lambert", ShadingModel::Han, 1e6);
     let one = Size { width: 1, height: 1 };
     let front = truth(&scene, one, 1, 0).picture.texels()[0];
@@ -320,7 +325,8 @@ fn a_surface_shows_its_back() {
     };
     towards.z = -towards.z;
     let back = truth(&scene, one, 1, 0).picture.texels()[0];
-    // Grooves are alike from both sides; chance puts 0.5/sqrt(32) = 9 % too much on a flank, and flanks differ by half.
+    // Grooves are alike from both sides; chance puts 0.5/sqrt(32) = 9 % too much on a flank, and flanks
+    // differ by half.
     assert!((back - front).length() < 0.2 * front.length(), "{back} {front}");
     let seen = filtered(&scene, "vmf:2", one, Lookups::TRILINEAR).texels()[0];
     assert!((seen - front).length() < 0.2 * front.length(), "{seen} {front}");

@@ -1,11 +1,12 @@
 //! Tables 3 to 10 and Figure 5 of Dupuy et al. 2013, supplemental, as contact sheets:
 //! `cargo run --release --example displacement_tables -- FOLDER`.
 //!
-//! Spheres of Gaussian noise: diffuse under a light from the front (3 to 5), diffuse in an environment (6, 7), mirrors in an environment (8
-//! to 10, and Figure 5). Each row is a roughness; from left to right its normal map and its displacement by brute force, and LEADR with more
-//! and more slopes. Prints the relative L2 error of each picture against the displacement, and against LEADR's own with the most slopes. An
-//! optional second argument is the side of a picture (200), a third the size of the maps (2048), a fourth the beginning of the names of the
-//! tables that are wanted (all).
+//! Spheres of Gaussian noise: diffuse under a light from the front (3 to 5), diffuse in an environment (6,
+//! 7), mirrors in an environment (8 to 10, and Figure 5). Each row is a roughness; from left to right its
+//! normal map and its displacement by brute force, and LEADR with more and more slopes. Prints the relative
+//! L2 error of each picture against the displacement, and against LEADR's own with the most slopes. An
+//! optional second argument is the side of a picture (200), a third the size of the maps (2048), a fourth the
+//! beginning of the names of the tables that are wanted (all).
 
 use std::path::Path;
 
@@ -71,7 +72,8 @@ const DEVIATIONS: [f64; 4] = [0.1, 0.25, 0.5, 1.0];
 /// Deviation of the scenes' slopes, displaced at scale 1.
 const DEVIATION: f64 = 0.25;
 
-/// Rays a pixel under a light; four times as many in an environment, whose directions are drawn, and more in small pictures.
+/// Rays a pixel under a light; four times as many in an environment, whose directions are drawn, and more in
+/// small pictures.
 const RAYS: usize = 64;
 
 /// What lights the spheres from everywhere.

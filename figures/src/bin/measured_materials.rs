@@ -1,4 +1,5 @@
-//! The table of measured materials in `docs/environment.md`: what their factors leave, and how far `sh:7` and `vmf:6` are from the truth.
+//! The table of measured materials in `docs/environment.md`: what their factors leave, and how far `sh:7` and
+//! `vmf:6` are from the truth.
 //!
 //! `cargo run --release --example measured_materials [-- MAP]`; without a map, on built-in foil.
 

@@ -116,15 +116,16 @@ impl std::convert::From<Precision> for pyramid::Precision {
 /// Light from everywhere.
 #[derive(Debug, Args)]
 pub(super) struct EnvironmentArguments {
-    /// Light the scene by an environment in place of its own lights: a float picture (.hdr, .exr) by latitude and longitude or of a cube,
-    /// or `builtin:NAME`
+    /// Light the scene by an environment in place of its own lights: a float picture (.hdr, .exr) by latitude
+    /// and longitude or of a cube, or `builtin:NAME`
     #[arg(long, value_name = "FILE", requires = "scene")]
     environment: Option<PathBuf>,
-    /// Turn the environment around the vertical, in degrees; with two numbers, from one to the other as time goes from 0 to 1
+    /// Turn the environment around the vertical, in degrees; with two numbers, from one to the other as time
+    /// goes from 0 to 1
     #[arg(long, value_name = "DEGREES[,TO]", value_parser = turn, allow_hyphen_values = true, requires = "environment")]
     turn: Option<[f64; 2]>,
-    /// How highlights look the environment up: cubes that microfacets have blurred (prefiltered), or Han et al.'s series over
-    /// half-vectors (harmonics)
+    /// How highlights look the environment up: cubes that microfacets have blurred (prefiltered), or Han et
+    /// al.'s series over half-vectors (harmonics)
     #[arg(long, value_name = "HOW", default_value = "prefiltered", value_parser = technique, requires = "environment")]
     environment_light: Technique,
 }

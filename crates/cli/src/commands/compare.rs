@@ -172,7 +172,8 @@ pub(super) struct Measured {
 impl Run<'_> {
     /// Measures; with a folder, writes the report.
     pub(super) fn measure(&self, folder: Option<&Path>, terminal: &Terminal) -> Result<Measured, Error> {
-        // A folder that cannot be made, or a scene that is not there, should be known before the minutes of measuring.
+        // A folder that cannot be made, or a scene that is not there, should be known before the minutes of
+        // measuring.
         if let Some(folder) = folder {
             std::fs::create_dir_all(folder).map_err(|e| MapError::io(folder, e))?;
         }

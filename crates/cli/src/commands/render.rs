@@ -41,7 +41,8 @@ pub(super) struct Render {
     /// A normal or height map, `builtin:NAME`, or a baked map, for the scene's first material
     #[arg(long)]
     map: Option<PathBuf>,
-    /// The picture to write, by the first method: .png as shown, .exr in linear light; several frames are numbered
+    /// The picture to write, by the first method: .png as shown, .exr in linear light; several frames are
+    /// numbered
     #[arg(short, long, value_name = "FILE", required_unless_present_any = ["compare", "truth_output", "json"])]
     output: Option<PathBuf>,
     #[arg(short, long, value_delimiter = ',', value_parser = method_spelling, help = "Methods, separated by commas [default: vmf:4; displaced, slopes; or a baked map's own]")]
@@ -74,10 +75,12 @@ pub(super) struct Render {
     /// Where the camera is and looks: EX,EY,EZ,TX,TY,TZ and perhaps its angle of view in degrees
     #[arg(long, value_name = "NUMBERS", value_parser = camera, allow_hyphen_values = true)]
     camera: Option<CameraSpec>,
-    /// A light in place of the scene's: the direction to it X,Y,Z, or `point:X,Y,Z`, and perhaps :R,G,B. May be repeated
+    /// A light in place of the scene's: the direction to it X,Y,Z, or `point:X,Y,Z`, and perhaps :R,G,B. May
+    /// be repeated
     #[arg(long, value_name = "LIGHT", value_parser = light, allow_hyphen_values = true)]
     light: Vec<Light>,
-    /// A reflectance lobe in place of the materials' own; where a material has roughness of its own, that still widens it
+    /// A reflectance lobe in place of the materials' own; where a material has roughness of its own, that
+    /// still widens it
     #[arg(long, value_parser = brdf_spelling)]
     brdf: Option<String>,
     /// What goes with the lobe: the factor of Tan et al., of Han et al. or of Smith (tan, han, smith);
@@ -99,7 +102,8 @@ pub(super) struct Render {
     /// Display values are sRGB of light times this
     #[arg(long, value_parser = positive)]
     exposure: Option<f64>,
-    /// How highlights are brought into the range of the PNG that `-o` writes: cut off (clip), or compressed (reinhard)
+    /// How highlights are brought into the range of the PNG that `-o` writes: cut off (clip), or compressed
+    /// (reinhard)
     #[arg(long, default_value = "clip", value_parser = tone)]
     tone: Tone,
     /// What renders
@@ -125,12 +129,13 @@ pub(super) struct Render {
 /// What is displaced.
 #[derive(Debug, Args)]
 pub(super) struct DisplaceArguments {
-    /// Height maps displace what they lie on, by SCALE times what keeps their slopes; lobes become microfacets, and the truth is that of the
-    /// displaced surface
+    /// Height maps displace what they lie on, by SCALE times what keeps their slopes; lobes become
+    /// microfacets, and the truth is that of the displaced surface
     #[arg(long, value_name = "SCALE", num_args = 0..=1, default_missing_value = "1", value_parser = scale,
         allow_negative_numbers = true, requires = "scene")]
     displace: Option<f64>,
-    /// Facets of displaced surfaces shade each other. The truth has every shadow; methods, those that facets cast nearby
+    /// Facets of displaced surfaces shade each other. The truth has every shadow; methods, those that facets
+    /// cast nearby
     #[arg(long, requires = "displace")]
     shadows: bool,
 }
@@ -151,8 +156,8 @@ fn scale(text: &str) -> Result<f64, String> {
 /// How maps are looked up.
 #[derive(Debug, Args)]
 pub(super) struct FilterArguments {
-    /// `trilinear`; `anisotropic:N`, with up to N taps along the longer axis, as texture units do; or `fine:N`, the same
-    /// in four times the taps at a level one finer, nearer to the pixel's square
+    /// `trilinear`; `anisotropic:N`, with up to N taps along the longer axis, as texture units do; or
+    /// `fine:N`, the same in four times the taps at a level one finer, nearer to the pixel's square
     #[arg(long, value_name = "FILTER", default_value = "fine:16", value_parser = filter, requires = "scene")]
     filter: Filtering,
     /// Levels to add to what the filter asks for; negative is sharper

@@ -11,8 +11,8 @@ pub(crate) fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// The folder of real maps beside the checkout; where it is missing the test says that it skips, on stderr and in the file that
-/// `NDFMAP_SKIPPED` names, which `scripts/test` counts.
+/// The folder of real maps beside the checkout; where it is missing the test says that it skips, on stderr
+/// and in the file that `NDFMAP_SKIPPED` names, which `scripts/test` counts.
 pub(crate) fn data() -> Option<PathBuf> {
     let folder = root().join("../shared/data");
     if folder.exists() {

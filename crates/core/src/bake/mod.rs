@@ -64,7 +64,8 @@ impl<S: LevelSink + ?Sized> LevelSink for Box<S> {
     }
 }
 
-/// Bake of a surface by a method: put together, then [run](Bake::run) into a sink or [into memory](Bake::to_pyramid).
+/// Bake of a surface by a method: put together, then [run](Bake::run) into a sink or [into
+/// memory](Bake::to_pyramid).
 ///
 /// ```
 /// use ndfmap_core::bake::Bake;
@@ -121,10 +122,11 @@ impl<'a> Bake<'a> {
         Self { precision, ..self }
     }
 
-    /// The same with attributes, other maps of the surface's size: each lobe carries its weight times the mean of their values over its
-    /// normals, in a further layer an attribute.
+    /// The same with attributes, other maps of the surface's size: each lobe carries its weight times the
+    /// mean of their values over its normals, in a further layer an attribute.
     ///
-    /// Baking panics when the method's lobes carry none ([`Describe::carries_attributes`]), or one has another size.
+    /// Baking panics when the method's lobes carry none ([`Describe::carries_attributes`]), or one has
+    /// another size.
     ///
     /// [`Describe::carries_attributes`]: crate::ndf::Describe::carries_attributes
     #[must_use]

@@ -69,7 +69,8 @@ impl Band {
     }
 }
 
-/// Splits layers that lie one after another into bands of these lengths: for each band, its part of every layer.
+/// Splits layers that lie one after another into bands of these lengths: for each band, its part of every
+/// layer.
 pub(super) fn split_layers<'a, T>(
     data: &'a mut [T],
     layers: usize,

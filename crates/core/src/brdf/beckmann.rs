@@ -1,7 +1,7 @@
 //! Beckmann: `D(u) = exp(-tan²/alpha²) / (pi alpha² u⁴)`, w the half-vector. Walter et al. 2007, equation 25.
 //!
-//! A Gaussian of slopes of variance `alpha²/2`, so convolution in slope space is exact: `alpha'² = alpha² + 2v`.
-//! Zonal coefficients by quadrature: their moments have an upward recurrence, but it loses all digits
+//! A Gaussian of slopes of variance `alpha²/2`, so convolution in slope space is exact: `alpha'² = alpha² +
+//! 2v`. Zonal coefficients by quadrature: their moments have an upward recurrence, but it loses all digits
 //! for small alpha.
 
 use std::borrow::Cow;
@@ -97,7 +97,8 @@ mod tests {
 
     #[test]
     fn masking_follows_the_exact_form() {
-        // Smith's integral, 1/(1+L), L = (exp(-a²)/(a sqrt pi) - erfc a)/2; Walter et al. state 0.35 % for theirs.
+        // Smith's integral, 1/(1+L), L = (exp(-a²)/(a sqrt pi) - erfc a)/2; Walter et al. state 0.35 % for
+        // theirs.
         for u in [0.9_f64, 0.5, 0.2, 0.05] {
             for alpha in [0.1_f64, 0.5, 1.0] {
                 let a = u / (alpha * (1.0 - u * u).sqrt());

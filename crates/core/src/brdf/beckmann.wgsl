@@ -23,7 +23,8 @@ fn lobe_variance(base: f32) -> f32 {
     return base / 2.0;
 }
 
-// Density of facets over slopes, at a slope of this squared length in units of the lobe's deviation: D u⁴ times its variance.
+// Density of facets over slopes, at a slope of this squared length in units of the lobe's deviation: D u⁴
+// times its variance.
 fn lobe_slope_profile(base: f32, square: f32) -> f32 {
     return exp(-0.5 * square) / (2.0 * PI);
 }

@@ -1,5 +1,5 @@
-// Masking of facets whose slopes are Gaussian. Twin of the default methods of `Lobe` in lobe.rs: Beckmann's own, and that of lobes
-// without a form of their own.
+// Masking of facets whose slopes are Gaussian. Twin of the default methods of `Lobe` in lobe.rs: Beckmann's
+// own, and that of lobes without a form of their own.
 
 // Smith's `G1` at cosine `u > 0`, of a lobe that is `width` wide.
 fn lobe_masking(u: f32, width: f32) -> f32 {

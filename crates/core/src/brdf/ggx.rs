@@ -1,8 +1,9 @@
-//! GGX (Trowbridge-Reitz): `D(u) = alpha² / (pi ((alpha²-1) u² + 1)²)`, w the half-vector. Walter et al. 2007,
-//! equation 33.
+//! GGX (Trowbridge-Reitz): `D(u) = alpha² / (pi ((alpha²-1) u² + 1)²)`, w the half-vector. Walter et al.
+//! 2007, equation 33.
 //!
 //! Widening borrows Beckmann's rule, `alpha'² = alpha² + 2v`, as every engine does: GGX is no Gaussian and
-//! has no variance, so this is a convention; `compare` measures what it costs. Zonal coefficients by quadrature.
+//! has no variance, so this is a convention; `compare` measures what it costs. Zonal coefficients by
+//! quadrature.
 
 use std::borrow::Cow;
 use std::f64::consts::PI;
@@ -69,7 +70,8 @@ impl Lobe for Ggx {
         (2.0 * PI * (1.0 + 0.5 * square).powi(2)).recip()
     }
 
-    /// The same equation read as an area, which holds for negative means too: slopes seen along a plane are Student's t of two degrees.
+    /// The same equation read as an area, which holds for negative means too: slopes seen along a plane are
+    /// Student's t of two degrees.
     fn visible_area(&self, mean: f64, deviation: f64) -> f64 {
         let spread = 2.0 * deviation * deviation;
         let root = (mean * mean + spread).sqrt();

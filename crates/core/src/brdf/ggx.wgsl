@@ -24,7 +24,8 @@ fn lobe_variance(base: f32) -> f32 {
     return base / 2.0;
 }
 
-// Smith's masking at cosine `u > 0`, of a lobe of this kind that is `width` wide (Walter et al. 2007, equation 34).
+// Smith's masking at cosine `u > 0`, of a lobe of this kind that is `width` wide (Walter et al. 2007,
+// equation 34).
 fn lobe_masking(u: f32, width: f32) -> f32 {
     let tan_squared = max((1.0 - u * u) / (u * u), 0.0);
     return 2.0 / (1.0 + sqrt(1.0 + 2.0 * width * tan_squared));
@@ -41,7 +42,8 @@ fn lobe_visible_area(mean: f32, deviation: f32) -> f32 {
     return 0.5 * (mean + root);
 }
 
-// Density of facets over slopes, at a slope of this squared length in units of the lobe's deviation: D u⁴ times its variance.
+// Density of facets over slopes, at a slope of this squared length in units of the lobe's deviation: D u⁴
+// times its variance.
 fn lobe_slope_profile(base: f32, square: f32) -> f32 {
     let root = 1.0 + 0.5 * square;
     return 1.0 / (2.0 * PI * root * root);

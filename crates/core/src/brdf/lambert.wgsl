@@ -1,6 +1,8 @@
-// Lambert, perhaps widened by a lobe of normals. Twin of lambert.rs. Every shader has it, for the diffuse part.
+// Lambert, perhaps widened by a lobe of normals. Twin of lambert.rs. Every shader has it, for the diffuse
+// part.
 
-// Complementary error function, to 1.2e-7 of itself: the Chebyshev fit of Press et al., "Numerical Recipes in C" (1992), 6.2.
+// Complementary error function, to 1.2e-7 of itself: the Chebyshev fit of Press et al., "Numerical Recipes in
+// C" (1992), 6.2.
 fn erfc(x: f32) -> f32 {
     let z = abs(x);
     let t = 1.0 / (1.0 + 0.5 * z);
@@ -21,7 +23,8 @@ fn mean_of_positive_part(mean: f32, variance: f32) -> f32 {
     return mean * 0.5 * erfc(-t / sqrt(2.0)) + s * density;
 }
 
-// A_1 = coth kappa - 1/kappa: where the two are near each other, by its series, to 2e-9 at one half. Beyond 20, coth is 1.
+// A_1 = coth kappa - 1/kappa: where the two are near each other, by its series, to 2e-9 at one half. Beyond
+// 20, coth is 1.
 fn mean_cosine(kappa: f32) -> f32 {
     let k2 = kappa * kappa;
     if kappa < 0.5 {
@@ -30,7 +33,8 @@ fn mean_cosine(kappa: f32) -> f32 {
     return 1.0 / tanh(min(kappa, 20.0)) - 1.0 / kappa;
 }
 
-// Lambert's cosine u, averaged over a vMF lobe of normals of variance `v` around the normal that u belongs to.
+// Lambert's cosine u, averaged over a vMF lobe of normals of variance `v` around the normal that u belongs
+// to.
 fn lambert_evaluate(v: f32, u: f32) -> f32 {
     if v == 0.0 {
         return max(u, 0.0);

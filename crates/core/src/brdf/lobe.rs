@@ -1,8 +1,8 @@
 //! The contract of a lobe: `D`, how microfacets are distributed around a normal, or any other `f(w · n)`.
 //!
-//! Han et al. 2007, section 4: every such lobe acts on a distribution of normals by spherical convolution, so two facts
-//! are all that a method needs of it: its **zonal coefficients**, and how it **widens** when convolved with an isotropic
-//! lobe of normals.
+//! Han et al. 2007, section 4: every such lobe acts on a distribution of normals by spherical convolution, so
+//! two facts are all that a method needs of it: its **zonal coefficients**, and how it **widens** when
+//! convolved with an isotropic lobe of normals.
 
 use std::any::Any;
 use std::borrow::Cow;
@@ -47,8 +47,8 @@ pub trait Lobe: LobeObject + Debug + Display + Send + Sync {
     /// Slope variance of the lobe on one axis; `None` for Lambert, which is no narrow lobe.
     fn slope_variance(&self) -> Option<SlopeVariance>;
 
-    /// Smith's masking (Walter et al. 2007, section 5.1) at cosine `u > 0` to the normal, of a lobe of this kind that is
-    /// `width` wide; Beckmann's, where a lobe has none of its own.
+    /// Smith's masking (Walter et al. 2007, section 5.1) at cosine `u > 0` to the normal, of a lobe of this
+    /// kind that is `width` wide; Beckmann's, where a lobe has none of its own.
     fn masking(&self, u: f64, width: SlopeVariance) -> f64 {
         beckmann::masking(u, width)
     }
@@ -68,22 +68,25 @@ pub trait Lobe: LobeObject + Debug + Display + Send + Sync {
         Microfacets::Beckmann
     }
 
-    /// The microfacets of a lobe that is none: Beckmann's, as wide as it; `None` for lobes of microfacets, and for Lambert.
+    /// The microfacets of a lobe that is none: Beckmann's, as wide as it; `None` for lobes of microfacets,
+    /// and for Lambert.
     fn as_beckmann(&self) -> Option<Beckmann> {
         self.slope_variance().map(Beckmann::of_width)
     }
 
-    /// Density of facets over slopes, in units of the lobe's own deviations: D(u) u⁴ times its variance, at a slope of this squared
-    /// length. Not through u where a lobe is a function of slopes: near 1, u has few of their digits.
+    /// Density of facets over slopes, in units of the lobe's own deviations: D(u) u⁴ times its variance, at a
+    /// slope of this squared length. Not through u where a lobe is a function of slopes: near 1, u has few of
+    /// their digits.
     fn slope_profile(&self, square: f64) -> f64 {
         let variance = self.slope_variance().unwrap_or(SlopeVariance::ZERO).get();
         let u2 = 1.0 / (1.0 + variance * square);
         self.evaluate(u2.sqrt()) * u2 * u2 * variance
     }
 
-    /// Area, projected along a direction, of the facets that face it: the mean of `max(X, 0)` for X of this mean and deviation, X being
-    /// distributed as slopes are for lobes of this kind. Beckmann's Gaussian, where a lobe has none of its own. Per unit of area that the
-    /// facets cover, and masking apart: [`Self::masking`] is the mean over this.
+    /// Area, projected along a direction, of the facets that face it: the mean of `max(X, 0)` for X of this
+    /// mean and deviation, X being distributed as slopes are for lobes of this kind. Beckmann's Gaussian,
+    /// where a lobe has none of its own. Per unit of area that the facets cover, and masking apart:
+    /// [`Self::masking`] is the mean over this.
     fn visible_area(&self, mean: f64, deviation: f64) -> f64 {
         mean_of_positive_part(mean, deviation * deviation)
     }
@@ -95,8 +98,8 @@ pub trait Lobe: LobeObject + Debug + Display + Send + Sync {
         zonal_by_quadrature(self, order)
     }
 
-    /// Text of the twin in WGSL: `SPECULAR` and the functions `lobe_widen`, `lobe_evaluate`, `lobe_variance`, `lobe_masking`,
-    /// `lobe_slope_profile`, `lobe_visible_area`, `lobe_tint`.
+    /// Text of the twin in WGSL: `SPECULAR` and the functions `lobe_widen`, `lobe_evaluate`, `lobe_variance`,
+    /// `lobe_masking`, `lobe_slope_profile`, `lobe_visible_area`, `lobe_tint`.
     fn shader(&self) -> Cow<'static, str>;
 
     /// The one number, `base`, that the twin's functions take for this lobe.
@@ -125,7 +128,8 @@ pub trait LobeObject {
     /// This lobe convolved with an isotropic lobe of normals of variance `by`; exactly itself for zero.
     fn widen(&self, by: SlopeVariance) -> AnyLobe;
 
-    /// [`Self::widen`], then [`Lobe::evaluate`], without a lobe on the heap: what a pixel asks of a lobe, once.
+    /// [`Self::widen`], then [`Lobe::evaluate`], without a lobe on the heap: what a pixel asks of a lobe,
+    /// once.
     fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64;
 
     /// True for a lobe of the same kind and width.
@@ -159,7 +163,8 @@ impl PartialEq for dyn Lobe {
     }
 }
 
-/// Lobe of any kind, shared: cloned for nothing, compared by kind and width, read from and written as its spelling.
+/// Lobe of any kind, shared: cloned for nothing, compared by kind and width, read from and written as its
+/// spelling.
 #[derive(Clone)]
 pub struct AnyLobe(Arc<dyn Lobe>);
 

@@ -1,5 +1,5 @@
-// Smith's masking of facets for a Gaussian of slopes, in Walter et al.'s rational form (2007, equation 27). Twin of
-// `masking` in beckmann.rs, which lobes without a form of their own share.
+// Smith's masking of facets for a Gaussian of slopes, in Walter et al.'s rational form (2007, equation 27).
+// Twin of `masking` in beckmann.rs, which lobes without a form of their own share.
 
 // Masking at cosine `u > 0` to the normal, of facets whose slopes have the variance `width`.
 fn beckmann_masking(u: f32, width: f32) -> f32 {

@@ -12,8 +12,9 @@ pub enum Microfacets {
 }
 
 impl Microfacets {
-    /// `D`: area of facets per solid angle of their normals, per unit of macro-surface area, at the angle to the normal
-    /// of this squared cosine and squared sine. Both come apart, since near the normal `1 - cos²` has few digits left.
+    /// `D`: area of facets per solid angle of their normals, per unit of macro-surface area, at the angle to
+    /// the normal of this squared cosine and squared sine. Both come apart, since near the normal `1 - cos²`
+    /// has few digits left.
     #[must_use]
     pub fn d(self, alpha_squared: f64, cos_squared: f64, sin_squared: f64) -> f64 {
         match self {
@@ -36,8 +37,8 @@ impl Microfacets {
         self.d(alpha_squared, cos_squared, tan_squared * cos_squared)
     }
 
-    /// Squared tangent of the angle to the normal within which this share, 0 to 1, of the facets' projected area lies
-    /// (Walter et al. 2007, equations 28 and 35).
+    /// Squared tangent of the angle to the normal within which this share, 0 to 1, of the facets' projected
+    /// area lies (Walter et al. 2007, equations 28 and 35).
     #[must_use]
     pub fn quantile(self, alpha_squared: f64, share: f64) -> f64 {
         match self {

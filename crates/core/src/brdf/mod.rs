@@ -1,7 +1,8 @@
 //! Bidirectional reflectance: how one normal sends light to the eye.
 //!
-//! A [`Brdf`] is a [`Lobe`] (the distribution of facets, `D`) in a [`ShadingModel`] (what multiplies it: Fresnel's term,
-//! masking, the diffuse part). [`TABLE`] lists the lobes; a row buys the conformance tests at the end of this file.
+//! A [`Brdf`] is a [`Lobe`] (the distribution of facets, `D`) in a [`ShadingModel`] (what multiplies it:
+//! Fresnel's term, masking, the diffuse part). [`TABLE`] lists the lobes; a row buys the conformance tests at
+//! the end of this file.
 
 mod beckmann;
 mod blinn_phong;
@@ -111,11 +112,12 @@ mod tests {
 
     #[test]
     fn widening_matches_the_convolution_with_a_von_mises_fisher_lobe() {
-        // The exact effect of a vMF lobe (kappa = 1/v) is to scale rho_l by its own zonal coefficient
-        // A_l: A_1 = coth k - 1/k, A_{l+1} = A_{l-1} - (2l+1)/k A_l. The rules approximate that. Shape (rho_l
-        // over rho_0) must agree to 4 %. GGX has no variance to add to, and the rule costs it up to 16 %. Energy rho_0 must stay, but for GGX and Beckmann, whose D holds one
-        // unit of *projected* area: the wider, the more of it leans, at most 1 + pi v ~ 10 % here;
-        // Torrance-Sparrow, normalised as on a plane, loses 2 sigma²/3.
+        // The exact effect of a vMF lobe (kappa = 1/v) is to scale rho_l by its own zonal coefficient A_l:
+        // A_1 = coth k - 1/k, A_{l+1} = A_{l-1} - (2l+1)/k A_l. The rules approximate that. Shape (rho_l over
+        // rho_0) must agree to 4 %. GGX has no variance to add to, and the rule costs it up to 16 %. Energy
+        // rho_0 must stay, but for GGX and Beckmann, whose D holds one unit of *projected* area: the wider,
+        // the more of it leans, at most 1 + pi v ~ 10 % here; Torrance-Sparrow, normalised as on a plane,
+        // loses 2 sigma²/3.
         let kappa = 50.0_f64;
         let mut a = vec![1.0, 1.0 / kappa.tanh() - 1.0 / kappa];
         for l in 1..4 {

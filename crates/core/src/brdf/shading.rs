@@ -1,7 +1,8 @@
-//! How a surface answers a light: a lobe, what multiplies it, and a diffuse part. The shading models of the papers.
+//! How a surface answers a light: a lobe, what multiplies it, and a diffuse part. The shading models of the
+//! papers.
 //!
-//! Light sent to the eye by one normal, per unit of irradiance on a plane that faces the light:
-//! `F(u) f(wh·n) c(n) + share(F) albedo max(wi·n, 0)/pi`, with u = wi·wh. The factor c is what sets the models apart; it
+//! Light sent to the eye by one normal, per unit of irradiance on a plane that faces the light: `F(u) f(wh·n)
+//! c(n) + share(F) albedo max(wi·n, 0)/pi`, with u = wi·wh. The factor c is what sets the models apart; it
 //! varies slowly with n, while f is narrow, and that is what makes filtering possible (`ndf/reflect.rs`).
 
 use std::f64::consts::PI;
@@ -15,21 +16,23 @@ use crate::words;
 /// Which factor and which Fresnel term go with the lobe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShadingModel {
-    /// Tan et al. 2005, section 3, a Cook-Torrance model without attenuation: `c = 1/(n·wo)`, Schlick's F, and
-    /// `1 - F` on the diffuse part. The cosine is held to [`LEAST_COSINE`], below which the paper says nothing.
+    /// Tan et al. 2005, section 3, a Cook-Torrance model without attenuation: `c = 1/(n·wo)`, Schlick's F,
+    /// and `1 - F` on the diffuse part. The cosine is held to [`LEAST_COSINE`], below which the paper says
+    /// nothing.
     Tan,
     /// Han et al. 2007, section 6: `c = max(n·wi, 0)`, no F.
     Han,
     /// Walter et al. 2007, equation 20: `c = G/(4 n·wo)`, G Smith's for the lobe's own width, Schlick's F.
     Smith,
-    /// Dupuy et al. 2013 without shadowing: `c = 1/(4 n·wo (1 + Lambda(wo)))`, Schlick's F. Facets hide each other from the eye, and from
-    /// no light.
+    /// Dupuy et al. 2013 without shadowing: `c = 1/(4 n·wo (1 + Lambda(wo)))`, Schlick's F. Facets hide each
+    /// other from the eye, and from no light.
     Masked,
     /// Dupuy et al. 2013 in full: `c = 1/(4 n·wo (1 + Lambda(wo) + Lambda(wi)))`, Schlick's F.
     Shadowed,
 }
 
-/// Least `n·wo` that Tan et al.'s model divides by: a normal turned further from the eye counts as one at 87 degrees.
+/// Least `n·wo` that Tan et al.'s model divides by: a normal turned further from the eye counts as one at 87
+/// degrees.
 pub const LEAST_COSINE: f64 = 0.05;
 
 words!(ShadingModel { Tan => "tan", Han => "han", Smith => "smith", Masked => "masked", Shadowed => "shadowed" });
@@ -41,7 +44,8 @@ impl ShadingModel {
         self as u32
     }
 
-    /// The Fresnel term: Schlick's, from the reflectance at normal incidence; for Han et al. that colour itself.
+    /// The Fresnel term: Schlick's, from the reflectance at normal incidence; for Han et al. that colour
+    /// itself.
     #[must_use]
     pub fn fresnel(self, specular: DVec3, u: f64) -> DVec3 {
         match self {
@@ -74,14 +78,15 @@ pub struct Directions {
 }
 
 impl Directions {
-    /// The path between two unit vectors; `None` where light or eye is below the surface, and nothing is reflected.
+    /// The path between two unit vectors; `None` where light or eye is below the surface, and nothing is
+    /// reflected.
     #[must_use]
     pub fn new(wi: DVec3, wo: DVec3) -> Option<Self> {
         if wi.z <= 0.0 || wo.z <= 0.0 { None } else { Self::between(wi, wo) }
     }
 
-    /// The path between two unit vectors, be they below the base surface: displaced facets may face them still. `None` only for a light
-    /// right behind what is seen, which has no half-vector.
+    /// The path between two unit vectors, be they below the base surface: displaced facets may face them
+    /// still. `None` only for a light right behind what is seen, which has no half-vector.
     #[must_use]
     pub fn between(wi: DVec3, wo: DVec3) -> Option<Self> {
         let wh = (wi + wo).try_normalize()?;
@@ -203,7 +208,8 @@ mod tests {
         let tan = f * d / o + (1.0 - f) * 0.5 * i / PI;
         let han = (0.04 * d + 0.5 / PI) * i;
         assert!((of(ShadingModel::Tan) - tan).abs() < 1e-14 && (of(ShadingModel::Han) - han).abs() < 1e-14);
-        // At alpha 0.3 neither direction is steep enough for Walter's form to leave 1, whose exact value it then is to 4e-4.
+        // At alpha 0.3 neither direction is steep enough for Walter's form to leave 1, whose exact value it
+        // then is to 4e-4.
         let smith = f * d / (4.0 * o) + (1.0 - f) * 0.5 * i / PI;
         assert!((of(ShadingModel::Smith) - smith).abs() < 1e-14);
     }

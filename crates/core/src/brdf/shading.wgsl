@@ -47,12 +47,14 @@ struct Brdf {
     // The least roughness that `table` is made for, and how much more the most is.
     roughness: f32,
     span: f32,
-    // What the method wants to know of the lobe, entry by entry, three of these each: at eleven roughnesses, and of the diffuse lobe.
+    // What the method wants to know of the lobe, entry by entry, three of these each: at eleven roughnesses,
+    // and of the diffuse lobe.
     table: Table,
 }
 
-// An entry of the table at any roughness: between two that it has, by equal steps of the root, each carried on as heat spreads on a sphere, at
-// the rate `decay`. `range` is the least roughness and the span. (The table comes by pointer: copied for every entry, it is what time goes into.)
+// An entry of the table at any roughness: between two that it has, by equal steps of the root, each carried
+// on as heat spreads on a sphere, at the rate `decay`. `range` is the least roughness and the span. (The
+// table comes by pointer: copied for every entry, it is what time goes into.)
 fn tabulated(table: ptr<function, Table>, range: vec2<f32>, entry: u32, roughness: f32, decay: f32) -> f32 {
     if range.y <= 0.0 {
         return (*table)[3u * entry].x;

@@ -1,5 +1,5 @@
-// Torrance-Sparrow as Han et al. use it: f = exp(-beta²/(4 sigma²)) / (4 pi sigma²), beta the angle to the half-vector.
-// Twin of torrance_sparrow.rs; `base` is sigma².
+// Torrance-Sparrow as Han et al. use it: f = exp(-beta²/(4 sigma²)) / (4 pi sigma²), beta the angle to the
+// half-vector. Twin of torrance_sparrow.rs; `base` is sigma².
 
 // True for a lobe around the half-vector.
 const SPECULAR: bool = true;
@@ -9,10 +9,11 @@ fn lobe_widen(base: f32, by: f32) -> f32 {
     return base + by / 2.0;
 }
 
-// The square of the angle whose cosine is `u`, 0 <= u <= 1. The language's own `acos` promises few digits, and none near 1.
+// The square of the angle whose cosine is `u`, 0 <= u <= 1. The language's own `acos` promises few digits,
+// and none near 1.
 //
-// From a quarter of the angle, b, sin²b = t: b² = asin²(sqrt t) = 1/2 sum (4t)^n / (n² binomial(2n, n)), t < 0.15, where eight terms leave
-// 1e-8.
+// From a quarter of the angle, b, sin²b = t: b² = asin²(sqrt t) = 1/2 sum (4t)^n / (n² binomial(2n, n)), t <
+// 0.15, where eight terms leave 1e-8.
 fn squared_angle(u: f32) -> f32 {
     let half = (1.0 - u) / 2.0;
     let t = half / (2.0 * (1.0 + sqrt(1.0 - half)));

@@ -1,5 +1,5 @@
-//! The E-step and the sums of the M-step in one: each sample is shared out among the lobes, and what every lobe
-//! got is added up. With the look-ups of `refine.rs`, the inner loop of everything that is fitted.
+//! The E-step and the sums of the M-step in one: each sample is shared out among the lobes, and what every
+//! lobe got is added up. With the look-ups of `refine.rs`, the inner loop of everything that is fitted.
 
 use std::ops::Range;
 
@@ -63,7 +63,8 @@ pub(crate) fn exp(x: f32) -> f32 {
     f32::from_bits(p.to_bits().wrapping_add(shifted.to_bits() << 23))
 }
 
-// Loops over lanes by number, one operation each: the form that becomes SIMD at every level, in the same order.
+// Loops over lanes by number, one operation each: the form that becomes SIMD at every level, in the same
+// order.
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "all planes are walked together, not the first alone")]
 fn assign_run<const J: usize, const N: usize>(
@@ -136,7 +137,8 @@ mod tests {
         for i in -8700..=4000 {
             let x = i as f32 * 0.01;
             let expected = f64::from(x).exp();
-            // 2e-7 from the series, and the argument times log2(e) rounded to 2^-23 of up to 2^23.6 magic steps: 8e-6.
+            // 2e-7 from the series, and the argument times log2(e) rounded to 2^-23 of up to 2^23.6 magic
+            // steps: 8e-6.
             assert!((f64::from(exp(x)) / expected - 1.0).abs() < 1e-5, "{x}: {} {expected}", exp(x));
         }
         assert!(exp(-1e9) > 0.0 && exp(-1e9) < 2e-38);

@@ -1,8 +1,9 @@
 //! The papers' prior: means drawn towards those of the parent and of neighbours already fitted.
 //!
-//! Han et al. 2007, section 6.3, and Tan et al. 2005, section 4.2, visit texels in scanline order. Here the texels of a
-//! level are visited in four passes, like the squares of a board with four colours: a texel sees its parent and
-//! those of its eight neighbours that an earlier pass has fitted. That is as coherent, and parallel.
+//! Han et al. 2007, section 6.3, and Tan et al. 2005, section 4.2, visit texels in scanline order. Here the
+//! texels of a level are visited in four passes, like the squares of a board with four colours: a texel sees
+//! its parent and those of its eight neighbours that an earlier pass has fitted. That is as coherent, and
+//! parallel.
 
 use rayon::prelude::*;
 

@@ -62,8 +62,8 @@ fn distance<const N: usize>(p: &[f32; N], q: &[f32; N]) -> f32 {
     (1..N).map(|k| (p[k] - q[k]).powi(2)).sum()
 }
 
-/// Picks seeds among the points one after another, the first the heaviest point; `next` picks from the points' squared
-/// distances to the seeds so far, negative where there is no point.
+/// Picks seeds among the points one after another, the first the heaviest point; `next` picks from the
+/// points' squared distances to the seeds so far, negative where there is no point.
 fn pick<const N: usize>(points: &Samples<N>, seeds: &mut [[f32; N]], mut next: impl FnMut(&[f32]) -> usize) {
     let weight = points.weights();
     let mut nearest: Vec<f32> = weight.iter().map(|w| if *w > 0.0 { f32::MAX } else { -1.0 }).collect();
@@ -77,8 +77,8 @@ fn pick<const N: usize>(points: &Samples<N>, seeds: &mut [[f32; N]], mut next: i
     }
 }
 
-/// Seeds each furthest from all before it (Hochbaum and Shmoys 1985, as in Han et al. 2007, section 6.2), and `sums`
-/// of the samples nearest to each.
+/// Seeds each furthest from all before it (Hochbaum and Shmoys 1985, as in Han et al. 2007, section 6.2), and
+/// `sums` of the samples nearest to each.
 pub(crate) fn start_from_furthest<const N: usize>(
     points: &Samples<N>,
     samples: &Samples<N>,
@@ -123,7 +123,8 @@ mod tests {
     /// Lobes: weight, direction, kappa.
     type Known = (f64, DVec3, f64);
 
-    /// A normal from a mixture of von Mises-Fisher lobes (Wood 1994: on the sphere the cosine has a closed form).
+    /// A normal from a mixture of von Mises-Fisher lobes (Wood 1994: on the sphere the cosine has a closed
+    /// form).
     fn draw(lobes: &[Known], random: &mut Pcg64Mcg) -> Vec3 {
         let mut pick: f64 = random.random();
         let lobe = lobes.iter().find(|l| {
@@ -167,9 +168,9 @@ mod tests {
                 mu.dot(DVec3::from_array(s.mean.map(f64::from))).min(1.0).acos()
             };
             let found = shapes.iter().min_by(|a, b| angle(a).total_cmp(&angle(b))).unwrap();
-            // Standard errors of a sample of n: sqrt(2/(n kappa)) for the direction (both axes), 1/sqrt(n) for ln kappa,
-            // sqrt(alpha (1-alpha)/N) for the weight. 5 of them, and half as much again for the little that lobes overlap.
-            // Banerjee's kappa is off by less than 1/kappa relative.
+            // Standard errors of a sample of n: sqrt(2/(n kappa)) for the direction (both axes), 1/sqrt(n)
+            // for ln kappa, sqrt(alpha (1-alpha)/N) for the weight. 5 of them, and half as much again for the
+            // little that lobes overlap. Banerjee's kappa is off by less than 1/kappa relative.
             let bound = 7.5;
             assert!(angle(found) < bound * (2.0 / (n * kappa)).sqrt(), "{mu} {found:?}");
             let spread = (f64::from(found.variance) * kappa).ln().abs();
@@ -220,7 +221,8 @@ mod tests {
         let mut before = f64::MIN;
         for _ in 0..30 {
             let now = log_likelihood(Planar, &samples, &sums);
-            // The M-step of a Gaussian is exact (Banerjee's kappa is not, hence the plane); single floats leave 1e-5.
+            // The M-step of a Gaussian is exact (Banerjee's kappa is not, hence the plane); single floats
+            // leave 1e-5.
             assert!(now > before - 1e-5, "{now} {before}");
             before = now;
             iterate(Planar, &samples, 1, &mut sums);

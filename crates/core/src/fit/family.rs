@@ -1,8 +1,9 @@
 //! Kinds of lobe that are fitted, as exponential families of any number of sufficient statistics.
 //!
-//! A lobe's *sums* are the weighted means of the statistics `(1, T(n))` over the normals it answers for. They mix by plain
-//! averaging and are all that an M-step needs, which is why a texel stores them. An E-step needs `log(alpha g(n))`, for
-//! every family a linear function of the same statistics, `theta · (1, T(n))`: N multiplications and an exponential a lobe.
+//! A lobe's *sums* are the weighted means of the statistics `(1, T(n))` over the normals it answers for. They
+//! mix by plain averaging and are all that an M-step needs, which is why a texel stores them. An E-step needs
+//! `log(alpha g(n))`, for every family a linear function of the same statistics, `theta · (1, T(n))`: N
+//! multiplications and an exponential a lobe.
 
 use glam::Vec3;
 
@@ -62,8 +63,8 @@ pub(crate) fn log_density<const N: usize>(theta: &[f32; N], t: &[f32; N]) -> f32
 
 /// Exponential family of lobes with N statistics, the first of them one.
 ///
-/// Sums are the weight, then N - 1 statistics times the weight. [`Isotropic`] makes one of four of whatever has a mean and one
-/// variance.
+/// Sums are the weight, then N - 1 statistics times the weight. [`Isotropic`] makes one of four of whatever
+/// has a mean and one variance.
 pub(crate) trait Family<const N: usize>: Copy + Send + Sync {
     /// `(1, T(n))`.
     fn statistics(self, n: Vec3) -> [f32; N];
@@ -77,7 +78,8 @@ pub(crate) trait Family<const N: usize>: Copy + Send + Sync {
     /// Variance of the lobe with these sums, on one axis.
     fn width(self, sums: &[f32; N]) -> f32;
 
-    /// Moves the lobes of a level towards the least error that is seen; nothing, for a family that knows no way.
+    /// Moves the lobes of a level towards the least error that is seen; nothing, for a family that knows no
+    /// way.
     fn refine(self, _grid: &SampleGrid<N>, _level: &mut LevelLobes<'_, N>, _rounds: usize) {}
 
     /// EM with the papers' prior for the texels of a level; plain EM, for a family that has no prior.
@@ -115,8 +117,8 @@ pub(crate) trait Isotropic: Copy + Send + Sync {
     /// A derivative by sums as one by the lobe's own `(ln alpha, mean, variance)`.
     fn slope_of_shape(self, shape: &Shape, slope: &[f32; 4]) -> ShapeSlope;
 
-    /// The mean of the paper's prior: this lobe drawn towards `Σ alpha_k mu_k` of its neighbours, of total weight
-    /// `weight`, by `strength`; `count` is the number of normals under the texel.
+    /// The mean of the paper's prior: this lobe drawn towards `Σ alpha_k mu_k` of its neighbours, of total
+    /// weight `weight`, by `strength`; `count` is the number of normals under the texel.
     fn with_prior(self, sums: &[f32; 4], pull: &Pull) -> [f32; 4];
 
     /// Sums of a shape as they are stored: a lobe that ended at the least variance has none that can be told.
@@ -187,7 +189,8 @@ fn unit_or_up(v: [f32; 3]) -> [f32; 3] {
 
 /// Von Mises-Fisher lobes on the sphere (Han et al. 2007, section 6): `T(n) = (n.x, n.y, 1 - n.z)`.
 ///
-/// The third statistic is counted from the pole, where most normals are and where `|r|` near 1 needs the digits.
+/// The third statistic is counted from the pole, where most normals are and where `|r|` near 1 needs the
+/// digits.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Spherical;
 
@@ -255,7 +258,8 @@ impl Isotropic for Spherical {
     }
 
     fn unit_natural(self, m: &[f32; 3], variance: f32) -> [f32; 4] {
-        // kappa/(2 pi (1 - e^{-2 kappa})) e^{kappa (n·mu - 1)}; the second factor is 1 in single floats above 10.
+        // kappa/(2 pi (1 - e^{-2 kappa})) e^{kappa (n·mu - 1)}; the second factor is 1 in single floats above
+        // 10.
         let kappa = variance.recip();
         let scale =
             if kappa > 10.0 { kappa } else { kappa / -(-2.0 * kappa).exp_m1() } / std::f32::consts::TAU;
@@ -316,7 +320,8 @@ impl Isotropic for Planar {
     }
 
     fn shape(self, alpha: f32, [x, y, _]: [f32; 3], variance: f32) -> Shape {
-        // Beyond the unit disk there are no normals; a little outside is where a mean of a rounded rim may lie.
+        // Beyond the unit disk there are no normals; a little outside is where a mean of a rounded rim may
+        // lie.
         let mean = [x.clamp(-1.1, 1.1), y.clamp(-1.1, 1.1), 0.0];
         Shape { alpha, mean, variance: variance.clamp(LEAST_VARIANCE, MOST_VARIANCE), length: 1.0 }
     }

@@ -1,7 +1,7 @@
 //! Optimal assignment: which lobe of a texel goes on with which lobe of its parent.
 //!
-//! With at most eight lobes, dynamic programming over subsets is exact and short: the cheapest way to give the lobes in
-//! a subset to the parent's first lobes, one after another.
+//! With at most eight lobes, dynamic programming over subsets is exact and short: the cheapest way to give
+//! the lobes in a subset to the parent's first lobes, one after another.
 
 use super::assign::MAX_LOBES;
 use super::family::Family;
@@ -25,7 +25,8 @@ pub(crate) fn match_lobes<const N: usize>(
     let gap =
         |i: usize, place: usize| 0.5 * (0..3).map(|k| (own[i][k] - parent[place][k]).powi(2)).sum::<f32>();
     let cost = |i: usize, place: usize| weights[i] * gap(i, place);
-    // best[set] is the least cost of giving the lobes in `set` to the parent's first |set|; last[set] the lobe given last.
+    // best[set] is the least cost of giving the lobes in `set` to the parent's first |set|; last[set] the
+    // lobe given last.
     let mut best = [f32::INFINITY; 1 << MAX_LOBES];
     let mut last = [0; 1 << MAX_LOBES];
     best[0] = 0.0;

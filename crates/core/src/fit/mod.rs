@@ -1,12 +1,13 @@
 //! Fitting: from the fine normals under each texel of each level to a few lobes, whose sums are then stored.
 //!
-//! Two questions are answered apart. *Which lobes?* Expectation maximisation (`em.rs`), then descent on the error
-//! that is seen (`refine.rs`). *Which lobe of this texel goes with which of its neighbours'?* What a filter mixes must
-//! belong together, so every alignment but `unaligned` goes from the coarsest level down and starts each texel from its
-//! parent. [`Alignment`] has the choices, from the papers' to ours. Everything works on sums of sufficient statistics
-//! (`family.rs`), so both kinds of lobe share all of it.
+//! Two questions are answered apart. *Which lobes?* Expectation maximisation (`em.rs`), then descent on the
+//! error that is seen (`refine.rs`). *Which lobe of this texel goes with which of its neighbours'?* What a
+//! filter mixes must belong together, so every alignment but `unaligned` goes from the coarsest level down
+//! and starts each texel from its parent. [`Alignment`] has the choices, from the papers' to ours. Everything
+//! works on sums of sufficient statistics (`family.rs`), so both kinds of lobe share all of it.
 //!
-//! Bytes do not depend on threads: a texel depends on its parent, its own samples and texels of earlier passes only.
+//! Bytes do not depend on threads: a texel depends on its parent, its own samples and texels of earlier
+//! passes only.
 
 mod assign;
 mod coherent;
@@ -49,7 +50,8 @@ pub enum LobeKind {
     Planar,
     /// Phong peaks `(weight, n.x, n.y, exponent)`, which are no sums and cannot be filtered or aligned.
     Peaks,
-    /// Gaussians of `n.xy` of any covariance; sums of `(1, n.x, n.y, n.x², n.y², n.x n.y)`. Only tests have them.
+    /// Gaussians of `n.xy` of any covariance; sums of `(1, n.x, n.y, n.x², n.y², n.x n.y)`. Only tests have
+    /// them.
     #[cfg(test)]
     Elliptic,
 }
@@ -153,7 +155,8 @@ const START_ROUNDS: usize = 5;
 const ROUNDS_BEFORE: usize = 4;
 const REFINE_ROUNDS_PER_LOBE: usize = 4;
 
-/// Levels finer than this hold few normals a texel, which EM meets exactly or nearly: they are refined less or not at all.
+/// Levels finer than this hold few normals a texel, which EM meets exactly or nearly: they are refined less
+/// or not at all.
 const FIRST_REFINED: usize = 2;
 const FIRST_REFINED_WELL: usize = 3;
 
@@ -216,7 +219,8 @@ impl<const N: usize> Level<N> {
         &self.sums[self.index_over(finer, (x, y)) * lobes..][..lobes]
     }
 
-    /// `theta` of every lobe of some rows, in place of their sums: what is asked of a parent by several children.
+    /// `theta` of every lobe of some rows, in place of their sums: what is asked of a parent by several
+    /// children.
     fn thetas(&self, family: impl Family<N>, lobes: usize, rows: Range<usize>) -> Vec<[f32; N]> {
         let line = self.size.width * lobes;
         self.sums[rows.start * line..rows.end * line].par_iter().map(|sums| family.natural(sums)).collect()
@@ -281,8 +285,9 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
         Level { size, sums: vec![[0.0; N]; size.area() * self.fit.lobes] }
     }
 
-    /// Every level above the finest, each texel by itself: the likeliest that EM finds from the normals furthest apart, from
-    /// the furthest of the lobes of the finer texels below it, and from seeds drawn at random.
+    /// Every level above the finest, each texel by itself: the likeliest that EM finds from the normals
+    /// furthest apart, from the furthest of the lobes of the finer texels below it, and from seeds drawn at
+    /// random.
     fn alone(&self) -> Result<Vec<Level<N>>, Cancelled> {
         let lobes = self.fit.lobes;
         let mut levels = vec![Level { size: self.sizes[0], sums: Vec::new() }];
@@ -300,7 +305,8 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
                 for start in 0..ALONE_STARTS {
                     match start {
                         0 => start_from_furthest(samples, samples, own),
-                        // The finest level's lobes are the normals themselves, which the first start has seen.
+                        // The finest level's lobes are the normals themselves, which the first start has
+                        // seen.
                         1 if level > 1 => {
                             start_from_furthest(&lobe_means(finer, lobes, size, at(size, i)), samples, own);
                         }
@@ -327,7 +333,8 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
         let mut made = self.empty(level);
         let size = made.size;
         let grid = self.samplings.for_level(size);
-        // One lobe has nothing to be aligned with, and its sums are exact means: refinement would only bend it to one roughness.
+        // One lobe has nothing to be aligned with, and its sums are exact means: refinement would only bend
+        // it to one roughness.
         let refined = self.fit.alignment == Alignment::Refined && lobes > 1;
         let rounds = match parent {
             None => 0,
@@ -368,10 +375,12 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
         made
     }
 
-    /// The start of the coarsest texel, which all others inherit: of several, the one whose lobes are narrowest.
+    /// The start of the coarsest texel, which all others inherit: of several, the one whose lobes are
+    /// narrowest.
     ///
-    /// Not the likeliest, nor the one of least error there: what the levels below need is lobes that divide the normals
-    /// well, as in k-means, and that measured better on both counts. For the same reason EM stays short.
+    /// Not the likeliest, nor the one of least error there: what the levels below need is lobes that divide
+    /// the normals well, as in k-means, and that measured better on both counts. For the same reason EM stays
+    /// short.
     fn start(&self, samples: &Samples<N>, sums: &mut [[f32; N]]) {
         start_from_furthest(samples, samples, sums);
         let mut least = f32::MAX;
@@ -407,7 +416,8 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
         })
     }
 
-    /// Each lobe's mean of an attribute, `y_j = Σ z_ij y_i / Σ z_ij`, times its weight (Han et al. 2007, section 6.4).
+    /// Each lobe's mean of an attribute, `y_j = Σ z_ij y_i / Σ z_ij`, times its weight (Han et al. 2007,
+    /// section 6.4).
     fn carry(&self, made: &Level<N>, attribute: &Grid<Rgba>) -> Vec<Rgba> {
         let (lobes, size, fine) = (self.fit.lobes, made.size, attribute.size());
         let mut carried = vec![[0.0; 4]; made.sums.len()];
@@ -435,7 +445,8 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
                     }
                 }
                 for ((carried, sums), weight) in carried.iter_mut().zip(sums).zip(weights) {
-                    // A lobe that refinement moved to where no normal is has none to ask: it carries the texel's mean.
+                    // A lobe that refinement moved to where no normal is has none to ask: it carries the
+                    // texel's mean.
                     let own =
                         if weight > LEAST_WEIGHT * LEAST_WEIGHT { carried.map(|c| c / weight) } else { mean };
                     *carried = own.map(|y| sums[0] * y);

@@ -1,10 +1,11 @@
-//! Peaks: a few Phong lobes by non-linear least squares. Fournier 1992, "Normal Distribution Functions and Multiple Surfaces",
-//! as Tan et al. 2005 and Han et al. 2007 compare with it.
+//! Peaks: a few Phong lobes by non-linear least squares. Fournier 1992, "Normal Distribution Functions and
+//! Multiple Surfaces", as Tan et al. 2005 and Han et al. 2007 compare with it.
 //!
-//! What is fitted is the texel's effective lobe under Blinn-Phong of exponent [`PROBE_EXPONENT`], a sharp enough look at its
-//! normals that is still smooth: the sum of peaks, each `weight (s'+1)/(2 pi) (w·d)^{s'}`, `s' = s PROBE_EXPONENT/(s + PROBE_EXPONENT)`, against
-//! the mean over the normals, at a grid of directions around them. It starts from EM's lobes, and weights are brought to sum
-//! to one at the end, so that energy is kept.
+//! What is fitted is the texel's effective lobe under Blinn-Phong of exponent [`PROBE_EXPONENT`], a sharp
+//! enough look at its normals that is still smooth: the sum of peaks, each `weight (s'+1)/(2 pi) (w·d)^{s'}`,
+//! `s' = s PROBE_EXPONENT/(s + PROBE_EXPONENT)`, against the mean over the normals, at a grid of directions
+//! around them. It starts from EM's lobes, and weights are brought to sum to one at the end, so that energy
+//! is kept.
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::storage::Owned;

@@ -1,19 +1,22 @@
-//! Refinement: moves a level's lobes towards the least squared error of the *effective lobe*, at texels and between.
+//! Refinement: moves a level's lobes towards the least squared error of the *effective lobe*, at texels and
+//! between.
 //!
-//! Likelihood is not what a viewer sees. For a BRDF lobe of variance `v0`, the squared error of a mixture against the
-//! normals themselves, both convolved with it, is
+//! Likelihood is not what a viewer sees. For a BRDF lobe of variance `v0`, the squared error of a mixture
+//! against the normals themselves, both convolved with it, is
 //!
-//! `E = Σ_ij alpha_i alpha_j k(v_i + v_j + 2 v0, mu_i, mu_j) - 2 Σ_i alpha_i mean_n k(v_i + 2 v0, mu_i, n) + constant`,
-//! `k(V, a, b) = exp(-gap(a, b)/V)/(2 pi V)`, gap half the squared distance: Gaussians, whose products integrate in
-//! closed form (on the sphere, to first order in V).
+//! `E = Σ_ij alpha_i alpha_j k(v_i + v_j + 2 v0, mu_i, mu_j) - 2 Σ_i alpha_i mean_n k(v_i + 2 v0, mu_i, n) +
+//! constant`, `k(V, a, b) = exp(-gap(a, b)/V)/(2 pi V)`, gap half the squared distance: Gaussians, whose
+//! products integrate in closed form (on the sphere, to first order in V).
 //!
-//! A filter between texels shows the mean of four texels' sums, against the normals of all four. So `E` is taken of each
-//! texel and of every 2 × 2 *window* of neighbours, whose sums are that mean: lobes that do not belong together make a
-//! bad window, and move. No texel waits for another: a round takes the windows of one of four offsets, which
-//! cover every texel once, so windows are independent and the result does not depend on the number of threads.
+//! A filter between texels shows the mean of four texels' sums, against the normals of all four. So `E` is
+//! taken of each texel and of every 2 × 2 *window* of neighbours, whose sums are that mean: lobes that do not
+//! belong together make a bad window, and move. No texel waits for another: a round takes the windows of one
+//! of four offsets, which cover every texel once, so windows are independent and the result does not depend
+//! on the number of threads.
 //!
-//! Descent is by `(ln alpha, mu, v)` with momentum, each step divided by a bound on the curvature: that of the lobe alone,
-//! times how crowded its place is. This objective is ours, not the papers' (`docs/methods.md` has what it gains).
+//! Descent is by `(ln alpha, mu, v)` with momentum, each step divided by a bound on the curvature: that of
+//! the lobe alone, times how crowded its place is. This objective is ours, not the papers' (`docs/methods.md`
+//! has what it gains).
 
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
@@ -23,14 +26,16 @@ use super::family::{DEAD, Isotropic, Shape, ShapeSlope, gap};
 use super::samples::{SampleGrid, Samples};
 use crate::grid::Size;
 
-/// Variance `v0` of the BRDF lobe that errors are seen through: Blinn-Phong of exponent 140, the geometric mean of the two
-/// that the benchmark `lobes` measures with. Less favours sharp lobes and costs wide ones, more the other way round.
+/// Variance `v0` of the BRDF lobe that errors are seen through: Blinn-Phong of exponent 140, the geometric
+/// mean of the two that the benchmark `lobes` measures with. Less favours sharp lobes and costs wide ones,
+/// more the other way round.
 const LOBE_VARIANCE: f32 = 0.007;
 
 /// What windows count for, against 1 - this for texels.
 const WINDOW_WEIGHT: f32 = 0.2;
 
-/// Step taken, of one that a bound on the curvature makes safe (the bound is loose), and share of the last step taken again.
+/// Step taken, of one that a bound on the curvature makes safe (the bound is loose), and share of the last
+/// step taken again.
 const STEP: f32 = 1.4;
 const MOMENTUM: f32 = 0.5;
 
@@ -81,7 +86,8 @@ pub(crate) struct LevelLobes<'a, const N: usize> {
     pub(crate) sums: &'a mut [[f32; N]],
 }
 
-/// `0..n` in twos, beginning at `offset`; across the edge where that leaves none alone, else the odd ones are alone.
+/// `0..n` in twos, beginning at `offset`; across the edge where that leaves none alone, else the odd ones are
+/// alone.
 fn pairs(n: usize, offset: usize) -> Vec<Vec<usize>> {
     if n == 1 {
         return vec![vec![0]];
@@ -248,7 +254,8 @@ fn move_lobes(family: impl Isotropic, lobes: &mut [Moving], slopes: &[[f32; 4]],
         }
         let v = shape.variance + LOBE_VARIANCE;
         let s = family.slope_of_shape(shape, slope);
-        // Half the curvature of E for a lobe by itself: alpha²/(4 pi v) by ln alpha, over 2v by mu, over 2v² by v.
+        // Half the curvature of E for a lobe by itself: alpha²/(4 pi v) by ln alpha, over 2v by mu, over 2v²
+        // by v.
         let curvature = crowded * shape.alpha * shape.alpha / (2.0 * std::f32::consts::TAU * v);
         let by_mean = 2.0 * v / curvature;
         let [mx, my, mz] = s.mean.map(|m| m * by_mean);

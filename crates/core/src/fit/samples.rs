@@ -1,4 +1,5 @@
-//! The normals under a texel as weighted sufficient statistics, and fewer of them where many lie close together.
+//! The normals under a texel as weighted sufficient statistics, and fewer of them where many lie close
+//! together.
 
 use std::ops::Range;
 
@@ -140,8 +141,8 @@ impl<const N: usize> SampleGrid<N> {
 
     /// A grid of `level`, whose texels must be nested, with at most `per_cell` samples in each cell.
     ///
-    /// The cell's samples are cut in two across their widest spread, and the widest part again, until there are
-    /// enough parts; each is replaced by its weighted mean, so sums over all samples do not change.
+    /// The cell's samples are cut in two across their widest spread, and the widest part again, until there
+    /// are enough parts; each is replaced by its weighted mean, so sums over all samples do not change.
     pub(crate) fn merge(&self, level: Size, per_cell: usize) -> Self {
         let step = level.width * per_cell;
         let row = |y: usize, (samples, points, parts): &mut (Samples<N>, Vec<[f32; N]>, Vec<Part>)| {
@@ -250,8 +251,8 @@ pub(crate) struct Samplings<const N: usize> {
 
 /// First level that is merged, and samples kept in each of its cells and of every coarser level's.
 ///
-/// A level looks at the cells of the level before, so from level 5 on a texel has at most four times this many
-/// samples, whatever is under it. 64 begins to cost accuracy; 128 costs none that could be measured.
+/// A level looks at the cells of the level before, so from level 5 on a texel has at most four times this
+/// many samples, whatever is under it. 64 begins to cost accuracy; 128 costs none that could be measured.
 const MERGED_FROM: usize = 4;
 const MERGED_SAMPLES: usize = 128;
 

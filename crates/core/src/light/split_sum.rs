@@ -1,13 +1,16 @@
-//! What a lobe reflects of light that is the same from everywhere: the half of shading that knows of no environment.
+//! What a lobe reflects of light that is the same from everywhere: the half of shading that knows of no
+//! environment.
 //!
-//! Karis 2013 parts the integral over an environment in two: the mean radiance that a lobe sees, and what it reflects of a white sky. Here
-//! the second is that of our own shading under lights, for any lobe and model: the integral over all directions of the light of what
-//! `reflect` (`ndf/reflect.rs`) gives for one lobe of normals, factors at the normals that answer included. A table over the cosine between
-//! the lobe's mean and the eye, and over the spread of its normals.
+//! Karis 2013 parts the integral over an environment in two: the mean radiance that a lobe sees, and what it
+//! reflects of a white sky. Here the second is that of our own shading under lights, for any lobe and model:
+//! the integral over all directions of the light of what `reflect` (`ndf/reflect.rs`) gives for one lobe of
+//! normals, factors at the normals that answer included. A table over the cosine between the lobe's mean and
+//! the eye, and over the spread of its normals.
 //!
-//! Where the light comes from is of interest too: of a wide lobe seen flatly half is below the horizon of the normals that answer, so the
-//! rest comes from above the mirror direction, and from a narrower range. The table has both, from the mean of the light's directions, so
-//! that a blurred cube is asked for what has the same mean: else a bright window behind a sphere shines through its rim.
+//! Where the light comes from is of interest too: of a wide lobe seen flatly half is below the horizon of the
+//! normals that answer, so the rest comes from above the mirror direction, and from a narrower range. The
+//! table has both, from the mean of the light's directions, so that a blurred cube is asked for what has the
+//! same mean: else a bright window behind a sphere shines through its rim.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -36,7 +39,8 @@ pub struct Reflected {
     pub lobe: f64,
     /// The mean of Fresnel's rise over the diffuse part.
     pub rise: f64,
-    /// Sine of the angle between the lobe's mean and the mean direction of the light, over that of the mirror direction.
+    /// Sine of the angle between the lobe's mean and the mean direction of the light, over that of the mirror
+    /// direction.
     pub tilt: f64,
     /// Perceptual roughness of the blur that has light from as wide a range, over that of the lobe itself.
     pub blur: f64,
@@ -108,8 +112,8 @@ impl SplitSum {
         row(j).mix(row(j + 1), y - j as f64)
     }
 
-    /// The table as shaders take it, two texels an entry: scale and bias; lobe, rise, tilt and blur. One row more holds the zonal
-    /// coefficients from the left, and in its first texel, second, the facets.
+    /// The table as shaders take it, two texels an entry: scale and bias; lobe, rise, tilt and blur. One row
+    /// more holds the zonal coefficients from the left, and in its first texel, second, the facets.
     #[must_use]
     pub fn texels(&self) -> Vec<[f32; 4]> {
         let of = |e: &Reflected| {
@@ -153,7 +157,8 @@ fn reflected(brdf: &Brdf, cosine: f64, spread: SlopeVariance) -> Reflected {
     let share = |ring: usize| (ring as f64 + 0.5) / RINGS as f64;
     let (mut towards, mut all) = (DVec3::ZERO, 0.0);
     for ring in 0..RINGS {
-        // A warp of the shares to both ends, so that peak and tail have rings of their own: 3t² - 2t³, with its slope.
+        // A warp of the shares to both ends, so that peak and tail have rings of their own: 3t² - 2t³, with
+        // its slope.
         let t = share(ring);
         let (warped, slope) = (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t));
         let tan_squared = Microfacets::Ggx.quantile(alpha_squared, warped);
@@ -232,12 +237,14 @@ mod tests {
 
     #[test]
     fn a_smooth_mirror_reflects_all_and_a_rough_one_less() {
-        // Without Fresnel (specular 1), microfacets that hide each other and nothing else send back what they see: 1, for masking alone,
-        // but for light from below, which the normal's own hemisphere ends: none at alpha 0.05 seen straight on.
+        // Without Fresnel (specular 1), microfacets that hide each other and nothing else send back what they
+        // see: 1, for masking alone, but for light from below, which the normal's own hemisphere ends: none
+        // at alpha 0.05 seen straight on.
         let masked = table("ggx:0.05", ShadingModel::Masked);
         let straight = masked.lookup(1.0, SlopeVariance::ZERO);
         assert!((straight.scale.x + straight.bias - 1.0).abs() < 0.01, "{straight:?}");
-        // Walter et al.'s single scattering of GGX at alpha 1, seen straight on: 0.45 (Heitz et al. 2016 show the loss, figure 3, as over half).
+        // Walter et al.'s single scattering of GGX at alpha 1, seen straight on: 0.45 (Heitz et al. 2016 show
+        // the loss, figure 3, as over half).
         let rough = table("ggx:1", ShadingModel::Smith).lookup(1.0, SlopeVariance::ZERO);
         assert!(rough.scale.x + rough.bias < 0.75, "{rough:?}");
         assert!(rough.scale.x + rough.bias > 0.3, "{rough:?}");
@@ -280,7 +287,8 @@ mod tests {
             assert!((got.lobe / lobe_sum - 1.0).abs() < 0.005, "{lobe}: {} {lobe_sum}", got.lobe);
             assert!((got.scale.x / scale - 1.0).abs() < 0.01, "{lobe}: {} {scale}", got.scale.x);
             assert!((got.bias - bias).abs() < 0.01 * scale, "{lobe}: {} {bias}", got.bias);
-            // Where the light comes from, of the same rings: a cosine that is 1 % off at 60 degrees is half a degree, and roughness is a root.
+            // Where the light comes from, of the same rings: a cosine that is 1 % off at 60 degrees is half a
+            // degree, and roughness is a root.
             let mean = towards / (scale + bias);
             let angle = got.towards(DVec3::Z, wo).angle_between(mean).to_degrees();
             assert!(angle < 0.5, "{lobe}: {angle} degrees");
@@ -296,15 +304,17 @@ mod tests {
         let wide = table("beckmann:0.6", ShadingModel::Han);
         for cosine in [0.2, 0.6, 1.0] {
             let straight = narrow.lookup(cosine, SlopeVariance::ZERO);
-            // Mirrored, half-vectors are twice as wide, and across the plane of incidence as wide as the cosine, so that the mean of both
-            // variances is (1 + cos²)/2 of what it is seen straight on: to the fourth root, roughness. A lobe of 0.02 has one per cent more.
+            // Mirrored, half-vectors are twice as wide, and across the plane of incidence as wide as the
+            // cosine, so that the mean of both variances is (1 + cos²)/2 of what it is seen straight on: to
+            // the fourth root, roughness. A lobe of 0.02 has one per cent more.
             let blur = ((1.0 + cosine * cosine) / 2.0_f64).powf(0.25);
             assert!((straight.tilt - 1.0).abs() < 0.01, "{straight:?}");
             assert!((straight.blur - blur).abs() < 0.01, "{straight:?} {blur}");
         }
         let flat = wide.lookup(0.1, SlopeVariance::ZERO);
         let wo = DVec3::new(0.99_f64.sqrt(), 0.0, 0.1);
-        // The mirror direction is at 0.1; all that a normal faces, by its cosine, has its mean at 2/3. So wide a lobe is nearer to that.
+        // The mirror direction is at 0.1; all that a normal faces, by its cosine, has its mean at 2/3. So
+        // wide a lobe is nearer to that.
         assert!(flat.towards(DVec3::Z, wo).z > 0.4 && flat.blur < 1.0, "{flat:?}");
     }
 }

@@ -1,6 +1,7 @@
 // What a lobe reflects of light that is the same from everywhere. Twin of split_sum.rs.
 
-// Entries of the table on each axis. The row below them has the lobe's zonal coefficients, and in its first texel what facets it has.
+// Entries of the table on each axis. The row below them has the lobe's zonal coefficients, and in its first
+// texel what facets it has.
 const SPLIT_SUM_ENTRIES: u32 = 16u;
 
 struct Reflected {
@@ -12,7 +13,8 @@ struct Reflected {
     lobe: f32,
     // The mean of Fresnel's rise over the diffuse part.
     rise: f32,
-    // Sine of the angle between the lobe's mean and the mean direction of the light, over that of the mirror direction.
+    // Sine of the angle between the lobe's mean and the mean direction of the light, over that of the mirror
+    // direction.
     tilt: f32,
     // Perceptual roughness of the blur that has light from as wide a range, over that of the lobe itself.
     blur: f32,

@@ -1,9 +1,10 @@
 //! Error between texels, where a filtered picture lives: at the middle of edges and at corners.
 //!
-//! The truth there is the mean of what the two or four texels around truly reflect, which is what a linear filter of
-//! reflectance would show. Two ways to approach it are measured: decoding the *filtered* channels, and the *reference path*,
-//! which shades every neighbour and blends the results (Han et al. 2007, section 6.3, for lobes that are not aligned).
-//! What the first loses against the second is misalignment, or for one lobe the width that its variance cannot hold.
+//! The truth there is the mean of what the two or four texels around truly reflect, which is what a linear
+//! filter of reflectance would show. Two ways to approach it are measured: decoding the *filtered* channels,
+//! and the *reference path*, which shades every neighbour and blends the results (Han et al. 2007, section
+//! 6.3, for lobes that are not aligned). What the first loses against the second is misalignment, or for one
+//! lobe the width that its variance cannot hold.
 
 use glam::DVec2;
 use rand::{SeedableRng, seq::SliceRandom};
@@ -89,7 +90,8 @@ fn corners_of(size: Size, wraps: Wraps, level: usize) -> Vec<Corner> {
     drawn.iter().map(corner).collect()
 }
 
-/// Which of a corner's texels meet at each place measured, and where that is, in texels from the first one's corner.
+/// Which of a corner's texels meet at each place measured, and where that is, in texels from the first one's
+/// corner.
 const PLACES: [(&[usize], DVec2); 3] =
     [(&[0, 1], DVec2::new(1.0, 0.5)), (&[0, 2], DVec2::new(0.5, 1.0)), (&[0, 1, 2, 3], DVec2::new(1.0, 1.0))];
 
@@ -108,7 +110,8 @@ pub fn evaluate_neighbours(
     }
 }
 
-/// The errors of a baked map between the texels of a level. What cannot be filtered takes the reference path for both.
+/// The errors of a baked map between the texels of a level. What cannot be filtered takes the reference path
+/// for both.
 #[must_use]
 pub fn filtering_error(
     pyramid: &Pyramid,

@@ -185,7 +185,8 @@ fn levels_are_area_weighted_means_of_the_finest() {
             let mut values = vec![0.0; 21 * 4 * method.layers()];
             method.accumulate_row(&row, &mut values);
             if let Some(layout) = method.lobe_layout() {
-                // All in the first lobe's layers, which are also their sum; other lobes' spare channels are ones.
+                // All in the first lobe's layers, which are also their sum; other lobes' spare channels are
+                // ones.
                 values.truncate(21 * 4 * layout.layers_each);
             }
             fine.push(values);
@@ -208,8 +209,9 @@ fn levels_are_area_weighted_means_of_the_finest() {
                             expected += weight * f64::from(values[((c / 4) * 21 + i) * 4 + c % 4]);
                         }
                     }
-                    // Sums of up to 273 single floats. Lobes too light to store give their 1/8192 to the others. The prior
-                    // and refinement move means on purpose; how far they may is what a picture would hardly show.
+                    // Sums of up to 273 single floats. Lobes too light to store give their 1/8192 to the
+                    // others. The prior and refinement move means on purpose; how far they may is what a
+                    // picture would hardly show.
                     let tolerance = match method.fit().map(|f| f.alignment) {
                         None => 1e-5,
                         Some(Alignment::Refined | Alignment::Prior) => 0.1,
@@ -367,8 +369,9 @@ fn effective_lobes_keep_their_energy() {
         let mut out = vec![0.0; directions.len()];
         method.evaluator(&*lobe, &directions).evaluate(&pyramid.texel(3, 0, 0), &mut out);
         let total: f64 = out.iter().zip(&weights).map(|(f, w)| f * w).sum();
-        // Slopes and the plane place a lobe by shifting it, which only near the vertical is a rotation, and factors are
-        // interpolated: a few percent. Else the quadrature and, for sh:16, ringing of rho_17 = 0.7 %.
+        // Slopes and the plane place a lobe by shifting it, which only near the vertical is a rotation, and
+        // factors are interpolated: a few percent. Else the quadrature and, for sh:16, ringing of rho_17 =
+        // 0.7 %.
         let planar = name.starts_with("slopes") || name.starts_with("gmm");
         let tolerance = if planar || name.ends_with("integrated") { 0.05 } else { 0.01 };
         assert!((total - 1.0).abs() < tolerance, "{name} {total}");

@@ -1,8 +1,8 @@
-//! Method of lobes with six statistics, which only the tests have: whatever is fitted, stored, filtered and decoded asks a lobe how
-//! many statistics it has, and none of it takes them for four.
+//! Method of lobes with six statistics, which only the tests have: whatever is fitted, stored, filtered and
+//! decoded asks a lobe how many statistics it has, and none of it takes them for four.
 //!
-//! A lobe is a Gaussian of `n.xy` with a covariance of its own, `alpha (1, x, y, x², y², xy)` in two layers. It is shaded as the
-//! isotropic one of the same trace.
+//! A lobe is a Gaussian of `n.xy` with a covariance of its own, `alpha (1, x, y, x², y², xy)` in two layers.
+//! It is shaded as the isotropic one of the same trace.
 
 use std::fmt::{self, Display};
 
@@ -146,8 +146,8 @@ impl Representation for Elliptic {
     }
 }
 
-/// Four by four blocks of a map: each half full of normals around one of two means, strewn along its own line, red under the one and
-/// blue under the other.
+/// Four by four blocks of a map: each half full of normals around one of two means, strewn along its own
+/// line, red under the one and blue under the other.
 fn two_kinds() -> (NormalGrid, Grid<[f32; 4]>) {
     let size = Size { width: 32, height: 16 };
     let kind = |x: usize| (x / 2) % 2;

@@ -1,7 +1,7 @@
 //! Encodings: what the channels of a stored map are, apart from the methods that read them.
 //!
-//! Several methods may read one encoding: `slopes:9` what `slopes` has stored, `naive` what `toksvig` has, `sh:4` what
-//! `sh:7` has. [`super::Describe::reads`] says which.
+//! Several methods may read one encoding: `slopes:9` what `slopes` has stored, `naive` what `toksvig` has,
+//! `sh:4` what `sh:7` has. [`super::Describe::reads`] says which.
 
 use super::NdmKernel;
 use crate::fit::LobeKind;
@@ -50,7 +50,8 @@ pub enum StoredSums {
 
 /// Layers in which the lobes of a texel, and what they carry, are stored.
 ///
-/// A lobe fills [`Self::layers_each`] layers, one lobe after another; behind them all follows, for each attribute, one layer a lobe.
+/// A lobe fills [`Self::layers_each`] layers, one lobe after another; behind them all follows, for each
+/// attribute, one layer a lobe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LobeLayout {
     /// Lobes of a texel.
@@ -78,7 +79,8 @@ impl LobeLayout {
         self.count * (self.layers_each + attributes)
     }
 
-    /// Value of an attribute that a lobe carries, from a texel's channels; `None` where the texel has no such layer.
+    /// Value of an attribute that a lobe carries, from a texel's channels; `None` where the texel has no such
+    /// layer.
     #[must_use]
     pub fn attribute(self, channels: &[f32], attribute: usize, lobe: usize) -> Option<[f32; 4]> {
         // It is stored times the lobe's weight, which comes first in the lobe's own layer.

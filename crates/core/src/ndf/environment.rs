@@ -1,10 +1,13 @@
-//! Shading a filtered texel under an environment: what its normals together send to the eye of light from everywhere.
+//! Shading a filtered texel under an environment: what its normals together send to the eye of light from
+//! everywhere.
 //!
-//! A sum of isotropic lobes is lit lobe by lobe. Diffuse: Han et al. 2007, equation 25. Specular: the mean radiance that the lobe sees, by
-//! either [`Technique`], times what it reflects of a white sky (`light/split_sum.rs`). A method that is no such sum is lit as one lobe, of its
-//! mean and spread. But a Gaussian of slopes is lit over a grid of them, as LEADR has it (Dupuy et al. 2013, sections 3.5 and 3.6): each
-//! slope mirrors the eye into the environment, looked up as wide as the solid angle that it stands for; on a displaced surface it counts by
-//! what the eye sees of it, and on a normal map by its share of the map. Small bright sources are lights, and none of this file's business.
+//! A sum of isotropic lobes is lit lobe by lobe. Diffuse: Han et al. 2007, equation 25. Specular: the mean
+//! radiance that the lobe sees, by either [`Technique`], times what it reflects of a white sky
+//! (`light/split_sum.rs`). A method that is no such sum is lit as one lobe, of its mean and spread. But a
+//! Gaussian of slopes is lit over a grid of them, as LEADR has it (Dupuy et al. 2013, sections 3.5 and 3.6):
+//! each slope mirrors the eye into the environment, looked up as wide as the solid angle that it stands for;
+//! on a displaced surface it counts by what the eye sees of it, and on a normal map by its share of the map.
+//! Small bright sources are lights, and none of this file's business.
 
 use std::f64::consts::PI;
 
@@ -82,8 +85,8 @@ fn of_lobe(
         + reflected.diffuse_share(brdf.shading, params.specular) * diffuse
 }
 
-/// Han et al.'s equation 26 for the lobe alone; `Lambda_l` as printed, `exp(-l² variance/2)`, or `exp(-l(l+1) variance/2)`, which is how a
-/// von Mises-Fisher lobe of small variance begins.
+/// Han et al.'s equation 26 for the lobe alone; `Lambda_l` as printed, `exp(-l² variance/2)`, or `exp(-l(l+1)
+/// variance/2)`, which is how a von Mises-Fisher lobe of small variance begins.
 fn over_half_vectors(mu: DVec3, spread: SlopeVariance, printed: bool, local: &LocalEnvironment<'_>) -> DVec3 {
     let zonal: [f64; HALF_VECTOR_ORDER + 1] = std::array::from_fn(|l| {
         let rate = (l * if printed { l } else { l + 1 }) as f64;
@@ -144,7 +147,8 @@ struct Mirrors<'a> {
 }
 
 impl Mirrors<'_> {
-    /// What a facet shows: the environment in the mirror direction, as wide as the slopes that it stands for, and Fresnel's term.
+    /// What a facet shows: the environment in the mirror direction, as wide as the slopes that it stands for,
+    /// and Fresnel's term.
     fn shown(&self, sample: &SlopeSample) -> Option<(Directions, DVec3)> {
         let n = sample.slope_normal.normalize();
         let u = n.dot(self.local.wo);
@@ -179,7 +183,8 @@ impl Mirrors<'_> {
             weight,
             SlopeSample { slope_normal: n, weight, square: 0.0, step: SlopeGrid::step(self.grid.len()) },
         ));
-        // Facets that others hide from the light: `seen` is a (1 + Lambda(wo)), of which a Lambda(wi) more is in shadow.
+        // Facets that others hide from the light: `seen` is a (1 + Lambda(wo)), of which a Lambda(wi) more is
+        // in shadow.
         let hidden = |wi: DVec3| {
             if self.brdf.shading != ShadingModel::Shadowed {
                 return 0.0;
@@ -195,8 +200,8 @@ impl Mirrors<'_> {
         facets.iter().map(of).sum()
     }
 
-    /// Of a normal map: the integral over half-vectors of what `reflect` gives for a light, `4 u` for the light's directions. `narrow` is the
-    /// Gaussian without the lobe's own width.
+    /// Of a normal map: the integral over half-vectors of what `reflect` gives for a light, `4 u` for the
+    /// light's directions. `narrow` is the Gaussian without the lobe's own width.
     fn of_map(&self, narrow: SlopeGaussian) -> DVec3 {
         let lobe = &*self.brdf.lobe;
         let base = self.brdf.width(self.params.roughness);
@@ -226,7 +231,8 @@ impl Mirrors<'_> {
     }
 }
 
-/// Weight of a slope, for facets that are distributed as those of a lobe are: Gaussian ones weigh as the grid says.
+/// Weight of a slope, for facets that are distributed as those of a lobe are: Gaussian ones weigh as the grid
+/// says.
 fn profile(lobe: &dyn Lobe, sample: &SlopeSample) -> f64 {
     match lobe.microfacets() {
         Microfacets::Beckmann => sample.weight,
@@ -285,7 +291,8 @@ mod tests {
 
     #[test]
     fn five_by_five_slopes_are_enough_for_diffuse_facets() {
-        // Dupuy et al. 2013, section 2.3: 5 × 5 has all that matters, 9 × 9 is the converged result. Asked for: within 1 %.
+        // Dupuy et al. 2013, section 2.3: 5 × 5 has all that matters, 9 × 9 is the converged result. Asked
+        // for: within 1 %.
         let brdf = Brdf { lobe: "lambert".parse::<AnyLobe>().unwrap(), shading: ShadingModel::Masked };
         for deviations in DEVIATIONS {
             for cosine in [1.0, 0.8, 0.5, 0.2] {
@@ -293,7 +300,8 @@ mod tests {
                 let converged = by("slopes:128");
                 for (method, bound) in [("slopes", 0.01), ("slopes:9", 0.002)] {
                     let off = (by(method) - converged).length() / converged.length();
-                    // Seen flatly, at roughness 0.5 and a fifth, five slopes across what the eye sees of them are few.
+                    // Seen flatly, at roughness 0.5 and a fifth, five slopes across what the eye sees of them
+                    // are few.
                     let bound = if cosine < 0.3 { 3.0 * bound } else { bound };
                     assert!(off < bound, "{method} {deviations:?} {cosine}: {off}");
                 }
@@ -341,7 +349,8 @@ mod tests {
             }
             let [five, nine, thirty_two] = off.map(|sum: f64| (sum / all).sqrt());
             assert!(thirty_two < nine && nine < five, "{deviation}: {five} {nine} {thirty_two}");
-            // Of 32 × 32 each is looked up a level wider than its solid angle, as the paper has it: lamps' edges are softer by so much.
+            // Of 32 × 32 each is looked up a level wider than its solid angle, as the paper has it: lamps'
+            // edges are softer by so much.
             assert!(thirty_two < 0.1, "{deviation}: {thirty_two}");
         }
     }

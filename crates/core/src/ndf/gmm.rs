@@ -1,10 +1,11 @@
-//! `gmm:J`: a mixture of isotropic Gaussians in the plane of `n.xy`, fitted and aligned. Tan et al. 2005, section 4.
+//! `gmm:J`: a mixture of isotropic Gaussians in the plane of `n.xy`, fitted and aligned. Tan et al. 2005,
+//! section 4.
 //!
-//! Lobe i holds `alpha, alpha mu, alpha (2 sigma² + |mu|²)`: with `sigma²` a variance on one axis, `E|n.xy|²` is
-//! `2 sigma² + |mu|²`, and that is what mixes linearly. The paper prints `sigma² + |mu|²` in and `E - |mu|²` out, mixing a
-//! variance on one axis with one on two, which doubles the spread between means; `gmm:J:printed` keeps that.
-//! A lobe is shaded in the plane too: the BRDF widened by `sigma²`, as a function of `|w.xy - mu|`, which for a Gaussian
-//! BRDF lobe is the paper's sum of variances.
+//! Lobe i holds `alpha, alpha mu, alpha (2 sigma² + |mu|²)`: with `sigma²` a variance on one axis, `E|n.xy|²`
+//! is `2 sigma² + |mu|²`, and that is what mixes linearly. The paper prints `sigma² + |mu|²` in and `E -
+//! |mu|²` out, mixing a variance on one axis with one on two, which doubles the spread between means;
+//! `gmm:J:printed` keeps that. A lobe is shaded in the plane too: the BRDF widened by `sigma²`, as a function
+//! of `|w.xy - mu|`, which for a Gaussian BRDF lobe is the paper's sum of variances.
 
 use std::fmt::{self, Display};
 
@@ -56,7 +57,8 @@ impl From<GaussianMixture> for Decoded {
     }
 }
 
-/// `w · n` of a normal as far from `w` as the two are in the plane: what the BRDF's own profile is a function of.
+/// `w · n` of a normal as far from `w` as the two are in the plane: what the BRDF's own profile is a function
+/// of.
 ///
 /// The plane is that of the upper hemisphere; below it nothing is reflected.
 fn planar_cosine(w: DVec3, mu: DVec3) -> f64 {

@@ -1,4 +1,5 @@
-// Isotropic Gaussians in the plane of n.xy: alpha, alpha mu, alpha (2 sigma² + |mu|²) (Tan et al. 2005). Twin of gmm.rs.
+// Isotropic Gaussians in the plane of n.xy: alpha, alpha mu, alpha (2 sigma² + |mu|²) (Tan et al. 2005). Twin
+// of gmm.rs.
 
 const NORMALISED: bool = true;
 

@@ -1,15 +1,18 @@
 //! LEADR: what a displaced surface sends to the eye, when its slopes are a Gaussian. Dupuy et al. 2013.
 //!
-//! Where the map displaces a surface, a facet weighs by the area that the eye sees of it, not by that of the map. Per unit of map area, of
-//! facets with slope density P22 (`slopes.rs`), the eye sees in all `A(wo) = ∫ max(wo·n, 0)/n.z P22 = a(wo) (1 + Lambda(wo))`, if none
-//! hides another; what is left when they do is `a(wo) = wo.z - E[slope]·wo.xy`, the projected area of the mean normal, so `1/(1 + Lambda)`
-//! is not a choice but what conserves area (the paper's section 1.5). Then, per unit of irradiance,
+//! Where the map displaces a surface, a facet weighs by the area that the eye sees of it, not by that of the
+//! map. Per unit of map area, of facets with slope density P22 (`slopes.rs`), the eye sees in all `A(wo) = ∫
+//! max(wo·n, 0)/n.z P22 = a(wo) (1 + Lambda(wo))`, if none hides another; what is left when they do is `a(wo)
+//! = wo.z - E[slope]·wo.xy`, the projected area of the mean normal, so `1/(1 + Lambda)` is not a choice but
+//! what conserves area (the paper's section 1.5). Then, per unit of irradiance,
 //!
 //! - specular facets: `F D(wh) / (4 a(wo) (1 + Lambda(wo) + Lambda(wi)))`, D = P22 / n.z⁴ (section 3.3);
-//! - diffuse facets: the mean of `max(n·wi, 0)/pi` over slopes on a grid, each weighing by what the eye sees of it (section 3.6).
+//! - diffuse facets: the mean of `max(n·wi, 0)/pi` over slopes on a grid, each weighing by what the eye sees
+//!   of it (section 3.6).
 //!
-//! Where no shadows are asked for, `Lambda(wi)` is left out (section 1.5). All is written with A, which is a closed form for Gaussian
-//! slopes whichever way the mean normal faces; so nothing needs to be clamped where the printed form divides by `a(wo)` near zero.
+//! Where no shadows are asked for, `Lambda(wi)` is left out (section 1.5). All is written with A, which is a
+//! closed form for Gaussian slopes whichever way the mean normal faces; so nothing needs to be clamped where
+//! the printed form divides by `a(wo)` near zero.
 
 use glam::{DMat2, DVec2, DVec3};
 
@@ -28,7 +31,8 @@ const ARTIFICIAL_TURN: f64 = 1.01;
 const LEAST_VISIBLE: f64 = 1e-6;
 
 impl SlopeGaussian {
-    /// This distribution after a linear map of slopes: how slopes of a map lie on a surface that it is stretched over.
+    /// This distribution after a linear map of slopes: how slopes of a map lie on a surface that it is
+    /// stretched over.
     #[must_use]
     pub fn stretched(self, by: DMat2) -> Self {
         let [xx, yy, xy] = self.covariance;
@@ -36,7 +40,8 @@ impl SlopeGaussian {
         Self { mean: by * self.mean, covariance: [moved.x_axis.x, moved.y_axis.y, moved.x_axis.y], ..self }
     }
 
-    /// Projected area of the mean normal towards a direction, per unit of map area; negative where it faces away.
+    /// Projected area of the mean normal towards a direction, per unit of map area; negative where it faces
+    /// away.
     #[must_use]
     pub fn projected_area(&self, w: DVec3) -> f64 {
         w.z - self.mean.dot(w.truncate())
@@ -62,7 +67,8 @@ impl SlopeGaussian {
         if area > 0.0 { (self.visible_area(lobe, w) / area - 1.0).max(0.0) } else { f64::INFINITY }
     }
 
-    /// [`Self::lambda`] for Gaussian slopes in Walter et al.'s rational form, as the paper has it (section 3.2), its clamps included.
+    /// [`Self::lambda`] for Gaussian slopes in Walter et al.'s rational form, as the paper has it (section
+    /// 3.2), its clamps included.
     #[must_use]
     pub fn lambda_rational(&self, w: DVec3) -> f64 {
         let nu = self.projected_area(w) / (std::f64::consts::SQRT_2 * self.projected_deviation(w));
@@ -70,8 +76,8 @@ impl SlopeGaussian {
         (1.0 - 1.259 * nu + 0.396 * nu * nu) / (3.535 * nu + 2.181 * nu * nu)
     }
 
-    /// D(n): area of facets per solid angle of their normals, per unit of map area, for slopes distributed as those of `lobe` are, and the
-    /// lobe's own width in the covariance already.
+    /// D(n): area of facets per solid angle of their normals, per unit of map area, for slopes distributed as
+    /// those of `lobe` are, and the lobe's own width in the covariance already.
     #[must_use]
     pub fn facets(&self, lobe: &dyn Lobe, n: DVec3) -> f64 {
         if n.z <= 0.0 {
@@ -112,8 +118,9 @@ impl SlopeGaussian {
         }
     }
 
-    /// The level of a cube of this side at which a facet that mirrors is looked up: as wide as the solid angle of directions that its
-    /// share of slopes mirrors to (section 3.5, in its form and with its constants).
+    /// The level of a cube of this side at which a facet that mirrors is looked up: as wide as the solid
+    /// angle of directions that its share of slopes mirrors to (section 3.5, in its form and with its
+    /// constants).
     pub(super) fn level(&self, grid: &SlopeGrid, sample: &SlopeSample, u: f64, side: usize) -> f64 {
         let [xx, yy, _] = self.covariance;
         let z = sample.slope_normal.length().recip();
@@ -135,8 +142,8 @@ pub(super) struct SlopeSample {
     pub(super) step: f64,
 }
 
-/// N × N slopes: a grid evenly spaced in deviations (section 3.4), 0.9 apart for five, and from -3 to 3 for more; or drawn at random, each as
-/// likely as the distribution says, to compare (Figure 5).
+/// N × N slopes: a grid evenly spaced in deviations (section 3.4), 0.9 apart for five, and from -3 to 3 for
+/// more; or drawn at random, each as likely as the distribution says, to compare (Figure 5).
 #[derive(Clone, Debug, PartialEq)]
 pub struct SlopeGrid {
     n: usize,
@@ -197,8 +204,9 @@ impl SlopeGrid {
         (DVec2::new(radius * cos, radius * sin), share, step)
     }
 
-    /// What is added to the level, by how many slopes there are (section 3.5): wider than their solid angle where they are few, lest
-    /// there be bands. Between the paper's three, evenly in the logarithm; drawn ones as they are.
+    /// What is added to the level, by how many slopes there are (section 3.5): wider than their solid angle
+    /// where they are few, lest there be bands. Between the paper's three, evenly in the logarithm; drawn
+    /// ones as they are.
     pub(super) fn level_offset(&self) -> f64 {
         const OFFSETS: [(f64, f64); 3] = [(5.0, 0.5), (32.0, -0.5), (128.0, -1.48)];
         if self.drawn {
@@ -210,14 +218,16 @@ impl SlopeGrid {
     }
 }
 
-/// A number that is as good as random for each other number (the permuted congruential generator of O'Neill 2014, as a hash).
+/// A number that is as good as random for each other number (the permuted congruential generator of O'Neill
+/// 2014, as a hash).
 fn hash(v: u32) -> u32 {
     let state = v.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
     let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
     (word >> 22) ^ word
 }
 
-/// Light from specular facets along a way, per unit of irradiance, Fresnel's term apart. `spread` holds the lobe's own width already.
+/// Light from specular facets along a way, per unit of irradiance, Fresnel's term apart. `spread` holds the
+/// lobe's own width already.
 fn specular(brdf: &Brdf, spread: &SlopeGaussian, texel: &FilteredTexel<'_>, directions: &Directions) -> f64 {
     let lobe = &*brdf.lobe;
     let roughness = (texel.params)(None).roughness;
@@ -303,7 +313,8 @@ mod tests {
         SlopeGaussian { height: 0.0, mean: DVec2::new(1.6 * x - 0.8, 1.6 * y - 0.8), covariance }
     }
 
-    /// `∫ f(n) D(n) dn`, over slopes: the grid is even along the axes of the covariance, in deviations from -9 to 9.
+    /// `∫ f(n) D(n) dn`, over slopes: the grid is even along the axes of the covariance, in deviations from
+    /// -9 to 9.
     fn over_facets(g: &SlopeGaussian, lobe: &dyn Lobe, f: impl Fn(DVec3) -> f64) -> f64 {
         let [xx, yy, xy] = g.covariance;
         let (deviation, shear) = (xx.sqrt(), xy / xx.sqrt());
@@ -324,8 +335,8 @@ mod tests {
 
     #[test]
     fn projected_area_is_conserved() {
-        // ∫ max(n·wo, 0) D(n) dn / (1 + Lambda(wo)) is the projected area of the mean normal. The kink of the maximum costs the quadrature
-        // some 1e-6, which a small area magnifies to at most 1e-4: asked for.
+        // ∫ max(n·wo, 0) D(n) dn / (1 + Lambda(wo)) is the projected area of the mean normal. The kink of the
+        // maximum costs the quadrature some 1e-6, which a small area magnifies to at most 1e-4: asked for.
         let mut random = Pcg64Mcg::seed_from_u64(6);
         let lobe = "beckmann:0.05".parse::<AnyLobe>().unwrap();
         let base = lobe.slope_variance().unwrap();
@@ -340,7 +351,8 @@ mod tests {
             let visible = over_facets(&g, &*lobe, |n| n.dot(w).max(0.0));
             let conserved = visible / (1.0 + g.lambda(&*lobe, w));
             assert!((conserved - area).abs() < 1e-4 * area, "{conserved} for {area}: {g:?} {w}");
-            // Walter et al. state 0.35 % for the rational form; beyond its clamp at nu = 0.001 nothing is promised.
+            // Walter et al. state 0.35 % for the rational form; beyond its clamp at nu = 0.001 nothing is
+            // promised.
             let nu = area / (std::f64::consts::SQRT_2 * g.projected_deviation(w));
             let rational = (1.0 + g.lambda_rational(w)) / (1.0 + g.lambda(&*lobe, w));
             assert!(nu < 0.001 || (rational - 1.0).abs() < 0.0036, "{rational} {nu}");
@@ -349,7 +361,8 @@ mod tests {
 
     #[test]
     fn visible_area_is_the_integral_whichever_way_the_mean_normal_faces() {
-        // GGX has tails: within nine deviations of its Gaussian namesake lie all but 1.2 % of its facets, which lean far.
+        // GGX has tails: within nine deviations of its Gaussian namesake lie all but 1.2 % of its facets,
+        // which lean far.
         let mut random = Pcg64Mcg::seed_from_u64(7);
         for (spelling, tolerance) in [("beckmann:0.3", 1e-5), ("ggx:0.3", 0.1)] {
             let lobe = spelling.parse::<AnyLobe>().unwrap();

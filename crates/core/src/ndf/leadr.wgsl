@@ -1,6 +1,7 @@
 // LEADR: what a displaced surface sends to the eye, when its slopes are a Gaussian. Twin of leadr.rs.
 //
-// Diffuse facets are averaged over GRID × GRID slopes: GRID_STEP deviations apart, or (GRID_DRAWN) drawn at random.
+// Diffuse facets are averaged over GRID × GRID slopes: GRID_STEP deviations apart, or (GRID_DRAWN) drawn at
+// random.
 
 // Weight of the artificial normal that keeps silhouettes defined.
 const ARTIFICIAL_WEIGHT: f32 = 1e-5;
@@ -59,14 +60,16 @@ fn artificial_normal(g: Decoded, wo: vec3<f32>) -> vec4<f32> {
     return vec4<f32>(n, max(dot(n, wo), LEAST_VISIBLE));
 }
 
-// A number that is as good as random for each other number (the permuted congruential generator of O'Neill 2014, as a hash).
+// A number that is as good as random for each other number (the permuted congruential generator of O'Neill
+// 2014, as a hash).
 fn slope_hash(v: u32) -> u32 {
     let state = v * 747796405u + 2891336453u;
     let word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
     return (word >> 22u) ^ word;
 }
 
-// A slope of the grid: its place in deviations, its weight (all of them add up to one), and the side of the square that it stands for.
+// A slope of the grid: its place in deviations, its weight (all of them add up to one), and the side of the
+// square that it stands for.
 fn slope_point(i: u32) -> vec4<f32> {
     if GRID_DRAWN {
         let u = (f32(slope_hash(2u * i) >> 8u) + 0.5) / 16777216.0;
@@ -141,7 +144,8 @@ fn displaced_diffuse(brdf: Brdf, g: Decoded, directions: Directions) -> f32 {
     return (lit + visible * max(dot(artificial.xyz, directions.wi), 0.0)) / (seen + visible + shadow);
 }
 
-// Light that a filtered texel of a displaced surface sends along the way, per unit of irradiance; `by` is how slopes of the map lie on it.
+// Light that a filtered texel of a displaced surface sends along the way, per unit of irradiance; `by` is how
+// slopes of the map lie on it.
 fn reflect_displaced(
     channels: ptr<function, Channels>,
     decoded: ptr<function, Decoded>,

@@ -1,6 +1,7 @@
 // A Gaussian of slopes under an environment: LEADR's grid. Twin of `of_slopes` in environment.rs.
 
-// Weight of a slope, for facets that are distributed as those of a lobe are; Gaussian ones weigh as the grid says.
+// Weight of a slope, for facets that are distributed as those of a lobe are; Gaussian ones weigh as the grid
+// says.
 fn slope_profile_weight(base: f32, weight: f32, square: f32) -> f32 {
     if GAUSSIAN_FACETS {
         return weight;

@@ -1,4 +1,5 @@
-//! The contract of a method: what it says of itself, how it stores and decodes, and the same for callers that choose at run time.
+//! The contract of a method: what it says of itself, how it stores and decodes, and the same for callers that
+//! choose at run time.
 
 use std::any::Any;
 use std::fmt::{self, Debug, Display};
@@ -36,7 +37,8 @@ pub trait Describe: Debug + Display + Send + Sync {
     /// Form in which its texels are shaded.
     fn form_kind(&self) -> FormKind;
 
-    /// Text of the twin of decoding and shading, in WGSL; see `crates/core/src/shader.rs` for how it is linked.
+    /// Text of the twin of decoding and shading, in WGSL; see `crates/core/src/shader.rs` for how it is
+    /// linked.
     fn shader(&self) -> Shader;
 
     /// True for channels that the method can read, though another method may have stored them.
@@ -220,7 +222,8 @@ pub trait Method: Describe {
     /// An evaluator for one lobe at fixed directions.
     fn evaluator<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a>;
 
-    /// A BRDF with everything that shading by this method takes of it, for texels of this roughness or others.
+    /// A BRDF with everything that shading by this method takes of it, for texels of this roughness or
+    /// others.
     fn prepare(&self, brdf: &Brdf, roughness: SlopeVariance) -> PreparedBrdf;
 
     /// The light that a texel sends to the eye; see [`FilteredTexel`].
@@ -332,7 +335,8 @@ impl PartialEq for dyn Method {
     }
 }
 
-/// Method of any kind, shared: cloned for nothing, compared by kind and options, read from and written as its spelling.
+/// Method of any kind, shared: cloned for nothing, compared by kind and options, read from and written as its
+/// spelling.
 #[derive(Clone)]
 pub struct AnyMethod(Arc<dyn Method>);
 

@@ -89,7 +89,8 @@ impl NormalLobe {
         Self { index: 0, weight: 1.0, mean, variance }
     }
 
-    /// The unit direction of the mean: on the sphere the mean itself; a planar mean, whose z is 0, is lifted to it.
+    /// The unit direction of the mean: on the sphere the mean itself; a planar mean, whose z is 0, is lifted
+    /// to it.
     #[must_use]
     pub fn direction(&self) -> DVec3 {
         let DVec3 { x, y, z } = self.mean;

@@ -1,6 +1,8 @@
-// Shading methods whose texels are sums of isotropic lobes. Twin of `reflect` in reflect.rs, for the form `Lobes`.
+// Shading methods whose texels are sums of isotropic lobes. Twin of `reflect` in reflect.rs, for the form
+// `Lobes`.
 //
-// A method brings `decode_lobe` (LAYERS_EACH layers to a lobe, from its first, of weight 0 where it says nothing), `cosine`, and NORMALISED.
+// A method brings `decode_lobe` (LAYERS_EACH layers to a lobe, from its first, of weight 0 where it says
+// nothing), `cosine`, and NORMALISED.
 
 alias Decoded = array<NormalLobe, LOBES>;
 

@@ -1,11 +1,11 @@
 //! Methods: how a texel stores, filters and reads the distribution of its normals.
 //!
 //! `bake → filter → decode → shade`. What is stored and filtered are **sums** ([`Representation::Sums`]),
-//! which mix by plain weighted averaging; what is shaded are decoded parameters
-//! ([`Representation::Lobes`]). They are two types, never one with flags. The typed contract is
-//! [`Representation`]; every one of them is also a [`Method`], the same thing for callers that choose at
-//! run time, and [`AnyMethod`] owns one. What is *stored* ([`Encoding`]) is apart from how it is *read*, and a decoded texel
-//! is shaded in one of three forms ([`Form`]). [`TABLE`] has one row for each method; a row buys the conformance suite in
+//! which mix by plain weighted averaging; what is shaded are decoded parameters ([`Representation::Lobes`]).
+//! They are two types, never one with flags. The typed contract is [`Representation`]; every one of them is
+//! also a [`Method`], the same thing for callers that choose at run time, and [`AnyMethod`] owns one. What is
+//! *stored* ([`Encoding`]) is apart from how it is *read*, and a decoded texel is shaded in one of three
+//! forms ([`Form`]). [`TABLE`] has one row for each method; a row buys the conformance suite in
 //! `conformance.rs`. Notation: `docs/notation.md`.
 
 mod decoded;

@@ -6,10 +6,10 @@
 //! three normalisations ([`NdmNormalisation`]). `k` is one constant for a material: what makes the lobe of a
 //! flat map hold the BRDF's energy `rho_0`.
 //!
-//! Stored are the moments about the pole, of `n - (0,0,1)`: as linear as those about the origin, the
-//! same covariance, and in half floats without the cancellation of `E[z²] - E[z]²` near 1 (the test
-//! `moments_about_the_pole_keep_their_digits` has the numbers). Lambert is the mean positive part of `w·n` for
-//! that Gaussian.
+//! Stored are the moments about the pole, of `n - (0,0,1)`: as linear as those about the origin, the same
+//! covariance, and in half floats without the cancellation of `E[z²] - E[z]²` near 1 (the test
+//! `moments_about_the_pole_keep_their_digits` has the numbers). Lambert is the mean positive part of `w·n`
+//! for that Gaussian.
 
 use std::fmt::{self, Display};
 
@@ -226,9 +226,9 @@ impl SpaceGaussian {
 
 /// The matrix `L D Lᵀ` of a symmetric one, with the pivots held at `floor` or above.
 ///
-/// A covariance plus `floor` times the identity has no pivot below `floor`. Rounding of the stored moments can
-/// make the covariance indefinite, which a sharp lobe's small roughness does not mend; this does, and leaves
-/// every sound matrix as it is. x and y come first: their moments are the well-conditioned ones.
+/// A covariance plus `floor` times the identity has no pivot below `floor`. Rounding of the stored moments
+/// can make the covariance indefinite, which a sharp lobe's small roughness does not mend; this does, and
+/// leaves every sound matrix as it is. x and y come first: their moments are the well-conditioned ones.
 fn with_pivots_above(m: DMat3, floor: f64) -> DMat3 {
     let d0 = m.x_axis.x.max(floor);
     let (l10, l20) = (m.x_axis.y / d0, m.x_axis.z / d0);
@@ -383,7 +383,8 @@ impl Ndm {
     /// A density of this kernel and normalisation.
     ///
     /// # Errors
-    /// [`ParameterError::UnknownLobe`] for integrated factors of the lobe's own profile, which baking does not know.
+    /// [`ParameterError::UnknownLobe`] for integrated factors of the lobe's own profile, which baking does
+    /// not know.
     pub fn new(kernel: NdmKernel, normalisation: NdmNormalisation) -> Result<Self, ParameterError> {
         if kernel == NdmKernel::Profile && normalisation == NdmNormalisation::Integrated {
             return Err(ParameterError::UnknownLobe);

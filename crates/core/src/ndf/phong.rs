@@ -1,7 +1,9 @@
-//! `phong:J`: a few Phong peaks a texel, by non-linear least squares. Fournier 1992; a baseline in Tan et al. 2005.
+//! `phong:J`: a few Phong peaks a texel, by non-linear least squares. Fournier 1992; a baseline in Tan et al.
+//! 2005.
 //!
-//! A peak holds its weight, direction and exponent. None of these mixes: a filter shades every peak of every texel it
-//! reads, up to 8 J of them, and blends the results (`measure/between.rs`). A peak of exponent s is the BRDF widened by `1/s`.
+//! A peak holds its weight, direction and exponent. None of these mixes: a filter shades every peak of every
+//! texel it reads, up to 8 J of them, and blends the results (`measure/between.rs`). A peak of exponent s is
+//! the BRDF widened by `1/s`.
 
 use std::fmt::{self, Display};
 

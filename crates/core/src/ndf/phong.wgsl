@@ -1,4 +1,5 @@
-// Phong peaks: weight, direction, exponent (Fournier 1992). Not to be mixed: shaded texel by texel. Twin of phong.rs.
+// Phong peaks: weight, direction, exponent (Fournier 1992). Not to be mixed: shaded texel by texel. Twin of
+// phong.rs.
 
 const NORMALISED: bool = false;
 

@@ -1,8 +1,9 @@
 //! Shading a filtered texel: what its normals together send to the eye.
 //!
-//! The mean over normals of `f(wh·n) c(n)` (`brdf.rs`). f is the effective lobe's business. c varies slowly, and is
-//! taken at the normals that answer: those of lobe j that f picks, of mean `mu_j/v_j + wh/b`, b the variance of f, as for a
-//! product of two Gaussians. The papers take c at `mu_j`; for a lobe wider than f that is not where the light comes from.
+//! The mean over normals of `f(wh·n) c(n)` (`brdf.rs`). f is the effective lobe's business. c varies slowly,
+//! and is taken at the normals that answer: those of lobe j that f picks, of mean `mu_j/v_j + wh/b`, b the
+//! variance of f, as for a product of two Gaussians. The papers take c at `mu_j`; for a lobe wider than f
+//! that is not where the light comes from.
 
 use std::f64::consts::PI;
 
@@ -52,7 +53,8 @@ pub struct FilteredTexel<'a> {
     pub params: &'a dyn Fn(Option<usize>) -> SurfaceParams,
     /// What was prepared for the material.
     pub prepared: &'a PreparedBrdf,
-    /// Shade as the papers print it: factors at the lobes' means; for displaced surfaces, the rational form of masking.
+    /// Shade as the papers print it: factors at the lobes' means; for displaced surfaces, the rational form
+    /// of masking.
     pub at_means: bool,
     /// For a displaced surface, how slopes of the map lie on it; `None` for a normal map.
     pub slope_map: Option<DMat2>,
@@ -75,7 +77,8 @@ pub(super) fn reflect<R: Representation>(
     }
 }
 
-/// Light of one distribution, through its effective lobe; `whole` is the isotropic lobe of normals most like it.
+/// Light of one distribution, through its effective lobe; `whole` is the isotropic lobe of normals most like
+/// it.
 fn of_whole<R: Representation>(
     representation: &R,
     decoded: &R::Lobes,
@@ -148,7 +151,8 @@ pub(super) fn responding_normal(lobe: &NormalLobe, mu: DVec3, base: SlopeVarianc
     (mu * base.get() + wh * lobe.variance.get()).try_normalize().unwrap_or(mu)
 }
 
-/// Light of a texel before colour: what facets reflect, Fresnel's term apart, and the mean cosine to the light.
+/// Light of a texel before colour: what facets reflect, Fresnel's term apart, and the mean cosine to the
+/// light.
 pub(super) struct Answer {
     pub(super) specular: f64,
     pub(super) diffuse: f64,
@@ -217,7 +221,8 @@ mod tests {
                     let wi = DVec3::new(0.7 * cos, 0.7 * sin, 0.6).normalize();
                     let wo = DVec3::new(0.5 * sin, -0.3, 0.8).normalize();
                     let directions = Directions::new(wi, wo).unwrap();
-                    // The factor that the facets have together, each as bright as its lobe: mean f c over mean f.
+                    // The factor that the facets have together, each as bright as its lobe: mean f c over
+                    // mean f.
                     let lobe = |n: &Vec3| brdf.lobe.evaluate(n.as_dvec3().dot(directions.wh));
                     let bright =
                         |n: &Vec3| lobe(n) * brdf.factor(n.as_dvec3(), &directions, params.roughness);

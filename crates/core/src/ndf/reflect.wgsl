@@ -1,6 +1,7 @@
 // Shading a filtered texel, what all methods share. Twin of reflect.rs.
 
-// A texel's channels: the method's LAYERS, then, for LOBES that carry them, ATTRIBUTES times as many of colours.
+// A texel's channels: the method's LAYERS, then, for LOBES that carry them, ATTRIBUTES times as many of
+// colours.
 alias Channels = array<vec4<f32>, ALL_LAYERS>;
 
 // A lobe ready to be shaded: the BRDF widened by `variance`, around `mean`.
@@ -19,7 +20,8 @@ fn direction_or_up(v: vec3<f32>) -> vec3<f32> {
     return select(vec3<f32>(0.0, 0.0, 1.0), v * inverseSqrt(max(square, 1e-30)), square > 1e-30);
 }
 
-// Mean direction of a lobe's normals that send light along the half-vector: those of the product of two Gaussians.
+// Mean direction of a lobe's normals that send light along the half-vector: those of the product of two
+// Gaussians.
 fn responding_normal(lobe: NormalLobe, mu: vec3<f32>, base: f32, wh: vec3<f32>) -> vec3<f32> {
     let v = mu * base + wh * lobe.variance;
     let square = dot(v, v);

@@ -1,7 +1,7 @@
 //! `sh:L`: the distribution in real spherical harmonics up to order L. Han et al. 2007, section 5.
 //!
-//! `gamma_lm = E[Y_lm(n)]`; the effective lobe is `Σ rho_l gamma_lm Y_lm(w)`, exact up to the cut at L, with the
-//! lobe's zonal coefficients `rho_l`. What rings below zero is clamped to zero. `sh:L:printed` uses the
+//! `gamma_lm = E[Y_lm(n)]`; the effective lobe is `Σ rho_l gamma_lm Y_lm(w)`, exact up to the cut at L, with
+//! the lobe's zonal coefficients `rho_l`. What rings below zero is clamped to zero. `sh:L:printed` uses the
 //! paper's `exp` approximations of `rho_l` in place of the exact ones, to show the difference.
 
 use std::fmt::{self, Display};

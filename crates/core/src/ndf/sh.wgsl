@@ -1,4 +1,5 @@
-// Real spherical harmonics up to ORDER (Han et al. 2007, section 5). Twin of sh.rs and of `spherical_harmonics` in sphere.rs.
+// Real spherical harmonics up to ORDER (Han et al. 2007, section 5). Twin of sh.rs and of
+// `spherical_harmonics` in sphere.rs.
 
 alias Decoded = Channels;
 

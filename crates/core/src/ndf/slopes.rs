@@ -2,13 +2,13 @@
 //! LEADR (Dupuy et al. 2013): `E[x], E[y], E[x²], E[y²], E[xy]` and the mean height.
 //!
 //! The base lobe's slope variance adds to both variances at shading time, and the lobe's own profile is
-//! stretched by the sum: in slopes, per unit of map area, a lobe around the vertical is
-//! `p(t) = f(u) u³`, u = 1/sqrt(1+t²), and t becomes the Mahalanobis distance in units of the lobe's own
-//! deviation. With no spread that is the lobe itself; for a Gaussian of angles it is LEAN's Gaussian.
-//! The density is per map area, `gamma = P22 / w.z³`, because that is how a normal map's texels weigh; LEAN's
-//! `D = P22 / w.z⁴` counts facet area and is brighter by 1/w.z where the map is steep (`docs/methods.md`
-//! has what that costs). Lambert is averaged over 5×5 slopes of the Gaussian, as in LEADR. On a surface that the map displaces, facets
-//! weigh by what the eye sees of them: `leadr.rs`.
+//! stretched by the sum: in slopes, per unit of map area, a lobe around the vertical is `p(t) = f(u) u³`, u =
+//! 1/sqrt(1+t²), and t becomes the Mahalanobis distance in units of the lobe's own deviation. With no spread
+//! that is the lobe itself; for a Gaussian of angles it is LEAN's Gaussian. The density is per map area,
+//! `gamma = P22 / w.z³`, because that is how a normal map's texels weigh; LEAN's `D = P22 / w.z⁴` counts
+//! facet area and is brighter by 1/w.z where the map is steep (`docs/methods.md` has what that costs).
+//! Lambert is averaged over 5×5 slopes of the Gaussian, as in LEADR. On a surface that the map displaces,
+//! facets weigh by what the eye sees of them: `leadr.rs`.
 
 use std::fmt::{self, Display};
 

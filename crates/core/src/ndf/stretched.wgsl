@@ -1,6 +1,7 @@
 // A lobe's own profile, stretched by a covariance of slopes. Twin of `stretched` in slopes.rs.
 
-// Density of slopes at `d` from the mean, for a lobe whose own width is already in the `covariance` (xx, yy, xy).
+// Density of slopes at `d` from the mean, for a lobe whose own width is already in the `covariance` (xx, yy,
+// xy).
 fn stretched(base: f32, covariance: vec3<f32>, d: vec2<f32>) -> f32 {
     let square = mahalanobis(covariance, d);
     // Per map area: the profile counts facet area, which is 1/u as much.

@@ -1,12 +1,13 @@
 //! `vmf:J`: a mixture of von Mises-Fisher lobes, fitted and aligned. Han et al. 2007, section 6.
 //!
-//! Lobe j holds `alpha, alpha r`, r the mean of its normals: a partition of what `toksvig` keeps. Filtered sums decode as
-//! `r = T(alpha r)/T(alpha)`, `kappa = (3|r| - |r|³)/(1 - |r|²)` (Banerjee et al. 2005), mean direction `r/|r|`. A lobe is
-//! shaded as the BRDF widened by the slope variance `1/kappa`, which for Blinn-Phong is `s' = kappa s/(kappa + s)`, for
-//! Torrance-Sparrow `sigma'² = sigma² + 1/(2 kappa)`, for Beckmann and GGX `alpha'² = alpha² + 2/kappa`.
+//! Lobe j holds `alpha, alpha r`, r the mean of its normals: a partition of what `toksvig` keeps. Filtered
+//! sums decode as `r = T(alpha r)/T(alpha)`, `kappa = (3|r| - |r|³)/(1 - |r|²)` (Banerjee et al. 2005), mean
+//! direction `r/|r|`. A lobe is shaded as the BRDF widened by the slope variance `1/kappa`, which for
+//! Blinn-Phong is `s' = kappa s/(kappa + s)`, for Torrance-Sparrow `sigma'² = sigma² + 1/(2 kappa)`, for
+//! Beckmann and GGX `alpha'² = alpha² + 2/kappa`.
 //!
-//! Stored about the pole, `alpha (1 - r.z)` in place of `alpha r.z`: as linear, and in half floats `1 - |r|²` keeps its
-//! digits (`docs/methods.md` has what that gains). `vmf:J:origin` stores the paper's form.
+//! Stored about the pole, `alpha (1 - r.z)` in place of `alpha r.z`: as linear, and in half floats `1 - |r|²`
+//! keeps its digits (`docs/methods.md` has what that gains). `vmf:J:origin` stores the paper's form.
 
 use std::fmt::{self, Display};
 

@@ -1,6 +1,8 @@
-// Shading methods whose texels are one distribution. Twin of `reflect` in reflect.rs, for the forms `Whole` and `Slopes`.
+// Shading methods whose texels are one distribution. Twin of `reflect` in reflect.rs, for the forms `Whole`
+// and `Slopes`.
 //
-// A method brings `Decoded`, `decode`, `mean_normal`, `effective` (around the half-vector) and `effective_diffuse`.
+// A method brings `Decoded`, `decode`, `mean_normal`, `effective` (around the half-vector) and
+// `effective_diffuse`.
 
 // Light that a texel sends along the way, per unit of irradiance.
 fn reflect_texel(

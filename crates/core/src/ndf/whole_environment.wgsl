@@ -1,4 +1,5 @@
-// Shading methods whose texels are one distribution, under an environment: as one lobe. Twin of `reflect` in environment.rs, for those.
+// Shading methods whose texels are one distribution, under an environment: as one lobe. Twin of `reflect` in
+// environment.rs, for those.
 
 // Light that a texel sends to the eye.
 fn reflect_environment(

@@ -1,8 +1,10 @@
-//! Gaussian noise on a sphere, as a height map of longitude and latitude: the primitive of Dupuy et al. 2013, figure 4.
+//! Gaussian noise on a sphere, as a height map of longitude and latitude: the primitive of Dupuy et al. 2013,
+//! figure 4.
 //!
-//! Slopes have the same deviations in the local frame everywhere on the sphere, whatever the map makes of it near the poles. A sum of wave
-//! packets (Lagae et al. 2009, "Procedural noise using sparse Gabor convolution", whose kernels these are): each a cosine of random phase
-//! under a Gaussian, its wave vector turned at random in the frame of its own place, all of one length on an ellipse. Many overlap at every
+//! Slopes have the same deviations in the local frame everywhere on the sphere, whatever the map makes of it
+//! near the poles. A sum of wave packets (Lagae et al. 2009, "Procedural noise using sparse Gabor
+//! convolution", whose kernels these are): each a cosine of random phase under a Gaussian, its wave vector
+//! turned at random in the frame of its own place, all of one length on an ellipse. Many overlap at every
 //! point, and so height and slopes are Gaussian.
 
 use std::f64::consts::{PI, TAU};
@@ -58,16 +60,19 @@ struct Packet {
     phase: f64,
 }
 
-/// Heights of a unit sphere whose slopes have these deviations eastward and northward, in units of the length `depth`.
+/// Heights of a unit sphere whose slopes have these deviations eastward and northward, in units of the length
+/// `depth`.
 ///
-/// The map goes once around and from the north pole to the south pole. It is as fine as its size allows: a wave has twelve texels at the equator.
+/// The map goes once around and from the north pole to the south pole. It is as fine as its size allows: a
+/// wave has twelve texels at the equator.
 #[must_use]
 pub fn sphere_noise(size: Size, deviations: DVec2, depth: f64, seed: u64) -> HeightField {
     // Of the longest wave vector, per radian; a packet is as wide as a wave is long.
     let number = (size.width as f64 / WAVE).max(2.0);
     let radius = TAU / number;
-    // Mean square slope of a packet on an axis, over the packet: k²/4 by its waves, turned at random (twice that on the longer axis of
-    // the ellipse), and this by its Gaussian; each times half of the Gaussian's square. The two axes' waves make up for the Gaussian.
+    // Mean square slope of a packet on an axis, over the packet: k²/4 by its waves, turned at random (twice
+    // that on the longer axis of the ellipse), and this by its Gaussian; each times half of the Gaussian's
+    // square. The two axes' waves make up for the Gaussian.
     let own = 0.5 / (radius * radius);
     let largest = deviations.max_element();
     let axis = |deviation: f64| {
@@ -127,7 +132,8 @@ impl Packet {
         for x in first..=last {
             let turn = (x as f64 - middle) / width * TAU;
             let away = on_sphere(self.longitude + turn, latitude) - self.at;
-            // Along the parallels and the meridians, so that waves keep to the local frame as it turns near the poles.
+            // Along the parallels and the meridians, so that waves keep to the local frame as it turns near
+            // the poles.
             let along = DVec2::new(turn * own_cos, latitude - self.latitude);
             let envelope = (-away.length_squared() / (2.0 * radius * radius)).exp();
             let height = envelope * (self.wave.dot(along) + self.phase).cos();
@@ -173,8 +179,9 @@ mod tests {
                         fourth += cos * u.powi(4);
                     }
                 }
-                // Central differences of waves of twelve texels lose (2 pi/12)²/6 = 4.6 %, longer ones less by the square. What chance leaves: some 250 packets' worth of
-                // independent places near the poles, 1/sqrt(250) of the variance; ten times as many elsewhere.
+                // Central differences of waves of twelve texels lose (2 pi/12)²/6 = 4.6 %, longer ones less
+                // by the square. What chance leaves: some 250 packets' worth of independent places near the
+                // poles, 1/sqrt(250) of the variance; ten times as many elsewhere.
                 let lost = DVec2::ONE - 0.046 * (asked / asked.max_element()).powf(2.0);
                 let got = DVec2::new((east / n).sqrt(), (north / n).sqrt()) / lost;
                 assert!(

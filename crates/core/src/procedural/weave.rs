@@ -1,4 +1,5 @@
-//! Weave: two families of round threads, over and under in turn. Four directions of normals at every scale of a cloth.
+//! Weave: two families of round threads, over and under in turn. Four directions of normals at every scale of
+//! a cloth.
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,5 @@
-//! A material's map, baked with one method: what renderers look up. And a baked map as the surface of a material.
+//! A material's map, baked with one method: what renderers look up. And a baked map as the surface of a
+//! material.
 
 use glam::DVec3;
 
@@ -46,8 +47,8 @@ impl BakedMaterial {
     }
 }
 
-/// A baked map, taken for a surface: rendered as it is by the method that baked it. Its finest level, where a texel is one
-/// normal, is what the truth sees and what other methods bake.
+/// A baked map, taken for a surface: rendered as it is by the method that baked it. Its finest level, where a
+/// texel is one normal, is what the truth sees and what other methods bake.
 pub struct BakedSurface {
     /// What it is baked with.
     pub method: AnyMethod,

@@ -56,7 +56,8 @@ pub struct Rays {
 }
 
 impl Rays {
-    /// Unit direction through a place in the picture, in pixels from its upper left corner; centres lie at halves.
+    /// Unit direction through a place in the picture, in pixels from its upper left corner; centres lie at
+    /// halves.
     #[inline]
     #[must_use]
     pub fn direction(&self, at: DVec2) -> DVec3 {

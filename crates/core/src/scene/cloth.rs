@@ -1,7 +1,9 @@
-//! Cloth that falls over a ball, after Han et al. 2007, figure 5. Simulated by positions, the same every time.
+//! Cloth that falls over a ball, after Han et al. 2007, figure 5. Simulated by positions, the same every
+//! time.
 //!
-//! Position-based dynamics (Müller et al. 2007): particles fall, are pushed out of the ball, and a few sweeps over the
-//! threads bring each back towards its length. Everything is in one order and one precision, so a frame is a function of time.
+//! Position-based dynamics (Müller et al. 2007): particles fall, are pushed out of the ball, and a few sweeps
+//! over the threads bring each back towards its length. Everything is in one order and one precision, so a
+//! frame is a function of time.
 
 use glam::{DVec2, DVec3, Vec3};
 
@@ -35,7 +37,8 @@ fn fallen(steps: usize) -> Vec<DVec3> {
     };
     let mut now: Vec<DVec3> = (0..side * side).map(place).collect();
     let mut before = now.clone();
-    // Threads, diagonals, and every second particle against folding: pairs with their length and how much they give.
+    // Threads, diagonals, and every second particle against folding: pairs with their length and how much
+    // they give.
     let mut threads = Vec::new();
     for (di, dj, firm) in [(1, 0, 1.0), (0, 1, 1.0), (1, 1, 0.6), (2, 0, 0.15), (0, 2, 0.15)] {
         for j in 0..side - dj {

@@ -1,4 +1,5 @@
-//! A horned lizard of our own making on sand, several maps on it, its skin drying: after Han et al. 2007, figure 8.
+//! A horned lizard of our own making on sand, several maps on it, its skin drying: after Han et al. 2007,
+//! figure 8.
 
 use glam::{DVec2, DVec3, Vec3};
 

@@ -1,4 +1,5 @@
-//! A desert under a low sun, after Tan et al. 2005, figure 1: dunes and ripples in the map, over rolling terrain.
+//! A desert under a low sun, after Tan et al. 2005, figure 1: dunes and ripples in the map, over rolling
+//! terrain.
 
 use std::f64::consts::TAU;
 

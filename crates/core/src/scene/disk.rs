@@ -1,4 +1,5 @@
-//! The carved silver disk, after Tan et al. 2005, figures 4, 6 and 7: from the front, zooming out, and at an oblique angle.
+//! The carved silver disk, after Tan et al. 2005, figures 4, 6 and 7: from the front, zooming out, and at an
+//! oblique angle.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 

@@ -1,10 +1,11 @@
 //! Relief: what a height map makes of the mesh that it lies on.
 //!
-//! A mesh with relief is displaced along its normals by `depth` times the height. Shading works in the frames of the mesh as it was, where
-//! the slopes of the relief are those of the map, but for how the map is stretched: with `P_x` and `P_y` how a place moves per texture
-//! width on the map, as seen in the frame, a slope m of the map becomes `depth (P_x P_y)⁻ᵀ m` on the surface. Where the map is laid on
-//! evenly, at `depth` per texture width, that is m. (The surface is taken for flat over the reach of a pixel, as LEADR does: heights are
-//! small beside its radius of curvature.)
+//! A mesh with relief is displaced along its normals by `depth` times the height. Shading works in the frames
+//! of the mesh as it was, where the slopes of the relief are those of the map, but for how the map is
+//! stretched: with `P_x` and `P_y` how a place moves per texture width on the map, as seen in the frame, a
+//! slope m of the map becomes `depth (P_x P_y)⁻ᵀ m` on the surface. Where the map is laid on evenly, at
+//! `depth` per texture width, that is m. (The surface is taken for flat over the reach of a pixel, as LEADR
+//! does: heights are small beside its radius of curvature.)
 
 use std::sync::Arc;
 
@@ -30,7 +31,8 @@ pub struct Displacement {
 }
 
 impl Displacement {
-    /// The heights of a surface that lies on a mesh at `width` a texture width, `scale` times as high as keeps their slopes.
+    /// The heights of a surface that lies on a mesh at `width` a texture width, `scale` times as high as
+    /// keeps their slopes.
     #[must_use]
     pub fn new(surface: &dyn Surface, width: f64, scale: f64) -> Self {
         let depth = scale * width;
@@ -93,13 +95,15 @@ pub(super) fn texture_width<'a>(meshes: impl Iterator<Item = &'a Mesh>, aspect: 
 }
 
 impl Mesh {
-    /// The mesh in triangles small enough for a relief to be tessellated in, with how slopes lie on it at each vertex.
+    /// The mesh in triangles small enough for a relief to be tessellated in, with how slopes lie on it at
+    /// each vertex.
     #[must_use]
     pub fn with_displacement(&self, displacement: &Displacement) -> Self {
         split(&Self { stretches: self.slope_maps(displacement), ..self.clone() })
     }
 
-    /// How slopes of the map lie on the surface, at each vertex: from the mean of the triangles around, by area.
+    /// How slopes of the map lie on the surface, at each vertex: from the mean of the triangles around, by
+    /// area.
     fn slope_maps(&self, displacement: &Displacement) -> Vec<Mat2> {
         let mut sums = vec![(DMat2::ZERO, 0.0); self.vertices.len()];
         for t in &self.triangles {

@@ -9,8 +9,8 @@ pub struct Vertex {
     pub position: Vec3,
     /// Unit normal of the base surface.
     pub normal: Vec3,
-    /// Unit vector along which `uv.x` grows; w is the sign in `bitangent = w normal × tangent`, which points *up* the
-    /// picture, against `uv.y`.
+    /// Unit vector along which `uv.x` grows; w is the sign in `bitangent = w normal × tangent`, which points
+    /// *up* the picture, against `uv.y`.
     pub tangent: Vec4,
     /// Place on the map, v down the rows; beyond 0..1 the map's own wrap holds.
     pub uv: Vec2,
@@ -30,8 +30,9 @@ pub struct Mesh {
 impl Mesh {
     /// A surface over the unit square, `columns × rows` cells of two triangles.
     ///
-    /// `place(s, t)` goes from the map's lower left (0, 0) to its upper right, so that the outside is where s and t turn
-    /// counter-clockwise. The map repeats `tiles` times. Frames come from differences along s and t.
+    /// `place(s, t)` goes from the map's lower left (0, 0) to its upper right, so that the outside is where s
+    /// and t turn counter-clockwise. The map repeats `tiles` times. Frames come from differences along s and
+    /// t.
     pub fn from_patch(
         (columns, rows): (usize, usize),
         tiles: DVec2,
@@ -64,7 +65,8 @@ impl Mesh {
         Self { vertices, triangles: grid_triangles(columns, rows), stretches: Vec::new() }
     }
 
-    /// A tube around a curve; `path(t)` gives its middle and radius for t from 0 to 1, and the map runs around and along.
+    /// A tube around a curve; `path(t)` gives its middle and radius for t from 0 to 1, and the map runs
+    /// around and along.
     pub fn from_tube(
         (around, along): (usize, usize),
         tiles: DVec2,
@@ -106,7 +108,8 @@ impl Mesh {
     }
 }
 
-/// Sum around each vertex of its triangles' normals, each twice as long as its triangle is large; not normalised.
+/// Sum around each vertex of its triangles' normals, each twice as long as its triangle is large; not
+/// normalised.
 #[must_use]
 pub fn area_normals(places: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
     let mut sums = vec![Vec3::ZERO; places.len()];

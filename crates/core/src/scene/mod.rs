@@ -1,7 +1,8 @@
 //! Scenes as data: a camera, meshes with materials, lights. And the table of built-in ones.
 //!
-//! World: right-handed, y up, no unit. A scene that moves is a function of time, 0 to 1; nothing else is kept between frames.
-//! [`TABLE`] has one row for each built-in scene, and a row buys the tests at the end of this file.
+//! World: right-handed, y up, no unit. A scene that moves is a function of time, 0 to 1; nothing else is kept
+//! between frames. [`TABLE`] has one row for each built-in scene, and a row buys the tests at the end of this
+//! file.
 
 mod armour;
 mod baked;
@@ -59,7 +60,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// What it is lit by.
     pub lights: Vec<Light>,
-    /// Light from everywhere. It reaches every normal from all directions that face it: what is below the base surface does, too.
+    /// Light from everywhere. It reaches every normal from all directions that face it: what is below the
+    /// base surface does, too.
     pub environment: Option<SceneEnvironment>,
     /// Radiance where nothing is hit, linear RGB.
     pub background: Vec3,
@@ -133,8 +135,9 @@ pub fn find(name: &str) -> Option<&'static Row> {
 }
 
 impl Scene {
-    /// Gives every material this lobe. A diffuse one leaves no highlight: what was specular colour becomes albedo. One that was measured
-    /// brings its own colours, and Han et al.'s model, with which it is what was measured.
+    /// Gives every material this lobe. A diffuse one leaves no highlight: what was specular colour becomes
+    /// albedo. One that was measured brings its own colours, and Han et al.'s model, with which it is what
+    /// was measured.
     pub fn set_brdf(&mut self, lobe: &dyn Lobe) {
         for material in &mut self.materials {
             material.brdf.lobe = lobe.widen(SlopeVariance::ZERO);
@@ -156,8 +159,9 @@ impl Scene {
         self.materials.iter_mut().for_each(|m| m.brdf.shading = shading);
     }
 
-    /// Lets maps with heights displace what they lie on: by `scale` times what keeps their slopes, so that 1 is the surface that the map was
-    /// made of. Lobes become those of microfacets; facets hide each other from the eye, and, with `shadows`, from lights.
+    /// Lets maps with heights displace what they lie on: by `scale` times what keeps their slopes, so that 1
+    /// is the surface that the map was made of. Lobes become those of microfacets; facets hide each other
+    /// from the eye, and, with `shadows`, from lights.
     ///
     /// # Errors
     /// [`NoHeights`] when no map has any.
@@ -283,7 +287,8 @@ mod tests {
 
     #[test]
     fn tangents_follow_the_maps() {
-        // Along a triangle's u the position moves with the tangent, and against v (v runs down) with the bitangent.
+        // Along a triangle's u the position moves with the tangent, and against v (v runs down) with the
+        // bitangent.
         for (row, _, scene) in scenes() {
             for object in &scene.objects {
                 let mesh = &object.mesh;

@@ -1,10 +1,13 @@
-//! Tessellation: a mesh with relief in triangles of about four pixels, displaced by the heights of the same scale.
+//! Tessellation: a mesh with relief in triangles of about four pixels, displaced by the heights of the same
+//! scale.
 //!
-//! Each triangle of the base mesh is a patch: a grid of `segments` on a side, a power of two. How many is up to its longest edge as seen; an
-//! edge that needs fewer has its points moved together, so that patches on both sides of it have the same, and there are no cracks. What
-//! an edge needs, and how high a point is, depends on nothing but themselves and the eye. (Where vertices at one place have different normals or
-//! lie on different parts of the map, at hard edges and seams, displacement tears the mesh.) Planning takes a pass over the base mesh; the
-//! points are worked out here ([`expand`]), or by the twin in `tessellation.wgsl`.
+//! Each triangle of the base mesh is a patch: a grid of `segments` on a side, a power of two. How many is up
+//! to its longest edge as seen; an edge that needs fewer has its points moved together, so that patches on
+//! both sides of it have the same, and there are no cracks. What an edge needs, and how high a point is,
+//! depends on nothing but themselves and the eye. (Where vertices at one place have different normals or lie
+//! on different parts of the map, at hard edges and seams, displacement tears the mesh.) Planning takes a
+//! pass over the base mesh; the points are worked out here ([`expand`]), or by the twin in
+//! `tessellation.wgsl`.
 
 use glam::{DVec2, DVec3, Mat2, Vec2, Vec3};
 use rayon::prelude::*;
@@ -12,8 +15,8 @@ use rayon::prelude::*;
 use super::{Displacement, Mesh, Rays, Vertex};
 use crate::grid::Size;
 
-/// Longest edge of a triangle, in pixels. Rounding to powers of two makes most of them half to all of that: with a right angle, triangles
-/// of two to eight pixels.
+/// Longest edge of a triangle, in pixels. Rounding to powers of two makes most of them half to all of that:
+/// with a right angle, triangles of two to eight pixels.
 const EDGE_PIXELS: f64 = 5.7;
 
 /// Heights are those of a scale this many pixels wide: what triangles of that size can show.
@@ -146,7 +149,8 @@ pub fn plan(mesh: &Mesh, displacement: &Displacement, rays: &Rays, size: Size) -
     plan
 }
 
-/// Weights of a patch's corners at a point of its grid: row `r` from the first corner on, 0 to `segments`, and `c` along it, 0 to `r`.
+/// Weights of a patch's corners at a point of its grid: row `r` from the first corner on, 0 to `segments`,
+/// and `c` along it, 0 to `r`.
 fn weights(patch: &Patch, r: u32, c: u32) -> [f32; 3] {
     let n = patch.segments;
     // On an edge that shows fewer segments, the point of it that is next.
@@ -182,7 +186,8 @@ fn point_of(i: u32) -> (u32, u32) {
     (row, i - first(row))
 }
 
-/// The corners of a grid's triangle, as numbers of points: rows have one, three, five triangles, every other one of them on its head.
+/// The corners of a grid's triangle, as numbers of points: rows have one, three, five triangles, every other
+/// one of them on its head.
 fn corners_of(i: u32) -> [u32; 3] {
     let mut row = f64::from(i).sqrt() as u32;
     if (row + 1) * (row + 1) <= i {
@@ -250,7 +255,8 @@ fn grown(mesh: &Mesh, plan: &Plan, place: impl Fn(Vertex) -> Vertex + Sync) -> M
     Mesh { vertices, triangles, stretches }
 }
 
-/// Cuts triangles that reach over more than a texture width, so that no patch need be cut finer near the eye than it can be.
+/// Cuts triangles that reach over more than a texture width, so that no patch need be cut finer near the eye
+/// than it can be.
 pub(super) fn split(mesh: &Mesh) -> Mesh {
     let longest = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|i| mesh.vertices[i as usize].uv);
@@ -301,7 +307,8 @@ mod tests {
         }
     }
 
-    /// Sphere-like scenes have no open edges: each edge of the displaced mesh must have its opposite, by position.
+    /// Sphere-like scenes have no open edges: each edge of the displaced mesh must have its opposite, by
+    /// position.
     #[test]
     fn there_are_no_cracks() {
         let staging = SceneOptions::default();
@@ -347,7 +354,8 @@ mod tests {
             let displacement = scene.materials[0].displacement.as_ref().unwrap();
             plan(&scene.objects[0].mesh, displacement, &scene.camera.rays(size), size).triangles
         };
-        // The near view fills the picture: twice its pixels over four are the front and the back, foreshortened on the way round.
+        // The near view fills the picture: twice its pixels over four are the front and the back,
+        // foreshortened on the way round.
         assert!(count(512, 0.0) < 300 * 300, "{}", count(512, 0.0));
         assert_eq!(count(512, 0.0), count(1024, 0.0));
         // From afar the base mesh is what is left.

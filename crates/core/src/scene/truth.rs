@@ -28,6 +28,7 @@ pub struct TruePicture {
     pub picture: Picture,
     /// Rays a pixel that it took.
     pub rays: usize,
-    /// Noise floor: relative L2 error that the picture has for want of rays, from the difference of its two halves.
+    /// Noise floor: relative L2 error that the picture has for want of rays, from the difference of its two
+    /// halves.
     pub noise: f64,
 }

@@ -1,4 +1,5 @@
-//! Straight grooves, after Han et al. 2007, figure 1: two directions and no others, so that answers have closed forms.
+//! Straight grooves, after Han et al. 2007, figure 1: two directions and no others, so that answers have
+//! closed forms.
 
 use glam::{DVec2, DVec3, Vec3};
 

@@ -1,7 +1,8 @@
-// What other programs call. `ndf_shade` looks a place of the map up and shades it; `ndf_shade_channels` shades channels that were
-// looked up otherwise. `ndf_brdf` is the lobe and its model.
+// What other programs call. `ndf_shade` looks a place of the map up and shades it; `ndf_shade_channels`
+// shades channels that were looked up otherwise. `ndf_brdf` is the lobe and its model.
 
-// A place to be shaded, in its tangent frame: x along u, y against v (v runs down the rows), z out of the surface.
+// A place to be shaded, in its tangent frame: x along u, y against v (v runs down the rows), z out of the
+// surface.
 struct NdfPlace {
     // Unit vector to the light.
     wi: vec3<f32>,

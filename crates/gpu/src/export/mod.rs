@@ -1,8 +1,8 @@
 //! Shaders for other programs: decoding and shading of one method with one lobe, in the languages of others.
 //!
-//! In [`TABLE`] a row is a language. WGSL is our own text, comments and all; the others are written by naga from the same text, as a
-//! library of functions whose names begin with `ndf_`, so that they stand in an engine's own shader without a clash. SPIR-V is no text
-//! to include: it is a whole fragment shader.
+//! In [`TABLE`] a row is a language. WGSL is our own text, comments and all; the others are written by naga
+//! from the same text, as a library of functions whose names begin with `ndf_`, so that they stand in an
+//! engine's own shader without a clash. SPIR-V is no text to include: it is a whole fragment shader.
 
 use std::fmt::Write as _;
 
@@ -207,7 +207,8 @@ fn glsl(linked: &Linked, version: back::glsl::Version, before: &str) -> Result<V
     back::glsl::Writer::new(&mut text, &module, &info, &options, &pipeline, policies)
         .and_then(|mut writer| writer.write())
         .map_err(|e| e.to_string())?;
-    // The functions alone: what comes before `main`, less the version, and less what only `main` binds, reads and writes.
+    // The functions alone: what comes before `main`, less the version, and less what only `main` binds, reads
+    // and writes.
     let functions = text.split("void main()").next().unwrap_or_default();
     let own = |line: &&str| {
         let bound = ["#version", "uniform ", "layout(", "smooth in ", "in ", "out "];

@@ -1,4 +1,5 @@
-// Works out the triangles of meshes with relief from their points: one invocation for each. Twin of `triangle` in geometry.rs.
+// Works out the triangles of meshes with relief from their points: one invocation for each. Twin of
+// `triangle` in geometry.rs.
 
 @group(0) @binding(2) var<storage, read> vertices: array<Vertex>;
 @group(0) @binding(3) var<storage, read_write> corners: array<u32>;

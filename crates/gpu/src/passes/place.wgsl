@@ -1,4 +1,5 @@
-// Draws what is seen where: for each pixel its place and object, its face and distance. Outlines are found in it.
+// Draws what is seen where: for each pixel its place and object, its face and distance. Outlines are found in
+// it.
 
 struct Surface {
     @location(0) place: vec4<f32>,

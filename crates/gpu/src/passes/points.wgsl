@@ -31,7 +31,8 @@ fn bilinear(uv: vec2<f32>, size: vec2<u32>, offset: u32) -> f32 {
     return mix(above, below, y.z);
 }
 
-// World height at a place of the map, of the level that a length of `over` in the world asks for. Twin of `Displacement::height`.
+// World height at a place of the map, of the level that a length of `over` in the world asks for. Twin of
+// `Displacement::height`.
 fn height(uv: vec2<f32>, over: f32) -> f32 {
     let texel = cut.texture_width / f32(cut.texels.x);
     let lod = min(log2(max(over / texel, 1.0)), f32(cut.levels - 1u));

@@ -1,7 +1,7 @@
 // What the passes that draw share: the camera, the lights, the triangles, and the surface under a pixel.
 //
-// Vertices are pulled from storage, so that a fragment knows its whole triangle: its face, and how the place on the map moves
-// in its plane. The twin is `Geometry` of the CPU renderer, which this must see alike.
+// Vertices are pulled from storage, so that a fragment knows its whole triangle: its face, and how the place
+// on the map moves in its plane. The twin is `Geometry` of the CPU renderer, which this must see alike.
 
 struct View {
     // Clip space from a place relative to the eye.
@@ -30,8 +30,8 @@ struct View {
 struct Light {
     // Unit vector to the light (w = 0), or where it is (w = 1).
     place: vec4<f32>,
-    // Irradiance on a plane that faces it, or radiant intensity. w = 1: of an environment, whose light normals see from below the base
-    // surface, too.
+    // Irradiance on a plane that faces it, or radiant intensity. w = 1: of an environment, whose light
+    // normals see from below the base surface, too.
     power: vec4<f32>,
 }
 

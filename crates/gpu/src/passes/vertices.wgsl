@@ -1,4 +1,5 @@
-// Vertices and triangles as they lie in buffers: written by the passes that cut meshes, or from the CPU, and read by those that draw.
+// Vertices and triangles as they lie in buffers: written by the passes that cut meshes, or from the CPU, and
+// read by those that draw.
 
 struct Vertex {
     // Position relative to the scene's middle, and uv.x.

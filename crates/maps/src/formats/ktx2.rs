@@ -1,8 +1,8 @@
 //! KTX2, the native container: a 2-D array texture, one array layer per RGBA layer, full mip chain.
 //!
-//! Written over the `ktx2` crate's serialisers, level 0 in bands while it is being baked, so a map need
-//! never be in memory whole. Read by hand from its header, level index and key/value data: the crate's
-//! `Reader` panics on a hostile data format descriptor, which we do not need. `docs/formats.md` has the layout.
+//! Written over the `ktx2` crate's serialisers, level 0 in bands while it is being baked, so a map need never
+//! be in memory whole. Read by hand from its header, level index and key/value data: the crate's `Reader`
+//! panics on a hostile data format descriptor, which we do not need. `docs/formats.md` has the layout.
 
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::Path;

@@ -1,8 +1,9 @@
 //! glTF 2.0 by the `gltf` crate: meshes in the pose of the file, and metallic-roughness materials.
 //!
-//! Read: positions, normals, tangents, the normal texture's coordinates (with `KHR_texture_transform` and scale), base
-//! colour, metalness and roughness, factors and textures. Colours and roughness are averaged over the texels of the
-//! normal map. Not read: animation, skins, morphs, occlusion, emission, alpha, cameras and lights.
+//! Read: positions, normals, tangents, the normal texture's coordinates (with `KHR_texture_transform` and
+//! scale), base colour, metalness and roughness, factors and textures. Colours and roughness are averaged
+//! over the texels of the normal map. Not read: animation, skins, morphs, occlusion, emission, alpha, cameras
+//! and lights.
 
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -414,7 +415,8 @@ impl Walk<'_> {
     }
 }
 
-/// Offset, rotation and scale of `KHR_texture_transform` on a normal texture, which the crate keeps as plain JSON.
+/// Offset, rotation and scale of `KHR_texture_transform` on a normal texture, which the crate keeps as plain
+/// JSON.
 fn normal_transform(normal: &gltf::material::NormalTexture<'_>) -> Option<(Vec2, f32, Vec2)> {
     let value = normal.extension_value("KHR_texture_transform")?;
     let pair = |key: &str, or: f32| {

@@ -1,7 +1,8 @@
 //! Models: meshes and materials from glTF, OBJ and PLY files, as scenes.
 //!
-//! A parser only fills in a raw mesh; what a file leaves out is made here, the same way for all: normals (area-weighted),
-//! map coordinates (`unwrap.rs`), tangents (MikkTSpace), and a camera and two lights that suit the model's size.
+//! A parser only fills in a raw mesh; what a file leaves out is made here, the same way for all: normals
+//! (area-weighted), map coordinates (`unwrap.rs`), tangents (MikkTSpace), and a camera and two lights that
+//! suit the model's size.
 
 mod gltf;
 mod obj;
@@ -83,7 +84,8 @@ pub fn read_model(path: &Path, options: &ModelOptions) -> Result<(Scene, Vec<Str
     model_of_bytes(path, &read_file(path)?, options)
 }
 
-/// Takes a whole file in memory as a model; its name says of which format, and where the files are that it names.
+/// Takes a whole file in memory as a model; its name says of which format, and where the files are that it
+/// names.
 ///
 /// # Errors
 /// [`MapError`] when it, or a file that it names, cannot be read.

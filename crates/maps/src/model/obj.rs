@@ -1,4 +1,5 @@
-//! Wavefront OBJ by the `tobj` crate: shapes, normals and map coordinates. Materials come from the command line.
+//! Wavefront OBJ by the `tobj` crate: shapes, normals and map coordinates. Materials come from the command
+//! line.
 
 use std::path::Path;
 

@@ -92,7 +92,8 @@ impl Engine for Gpu {
         let frame = Frame { view: Self::shown(view), maps, lookups };
         self.renderer.draw(&canvas, &frame)?;
         let picture = canvas.read()?;
-        // The picture's own passes made pipelines and read the result back: a frame like the next one tells what it takes.
+        // The picture's own passes made pipelines and read the result back: a frame like the next one tells
+        // what it takes.
         let milliseconds = self.renderer.time(&canvas, &frame)?;
         Ok(RenderedPicture { picture, milliseconds })
     }

@@ -1,5 +1,6 @@
-//! What a filter makes of lobes at a corner between four texels, as in Tan et al. 2005, figure 5: the histogram of the
-//! normals, lobes that were not aligned, aligned ones, and the reference path that shades each texel by itself.
+//! What a filter makes of lobes at a corner between four texels, as in Tan et al. 2005, figure 5: the
+//! histogram of the normals, lobes that were not aligned, aligned ones, and the reference path that shades
+//! each texel by itself.
 
 use glam::DVec2;
 use ndfmap_core::bake::Bake;

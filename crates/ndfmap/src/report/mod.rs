@@ -48,7 +48,8 @@ pub struct ReportFile {
 pub fn draw(pages: &Pages<'_>) -> Result<Vec<ReportFile>, Error> {
     let sheet = sheet::draw(pages.subject, pages.comparison).to_png()?;
     let disks = disks::draw(pages.subject, pages.comparison)?.to_png()?;
-    // It bakes every mixture once more, unaligned: seconds that only those who ask about filtering should wait for.
+    // It bakes every mixture once more, unaligned: seconds that only those who ask about filtering should
+    // wait for.
     let asked = pages.subject.filtering;
     let between = if asked { between::draw(pages.subject, pages.comparison)? } else { None };
     let between = between.map(|canvas| canvas.to_png()).transpose()?;

@@ -1,4 +1,5 @@
-//! The contact sheet of a rendering: truth and every method side by side, their differences, and the errors under them.
+//! The contact sheet of a rendering: truth and every method side by side, their differences, and the errors
+//! under them.
 
 use ndfmap_core::grid::Size;
 use ndfmap_core::metrics::{Picture, display};
@@ -46,7 +47,8 @@ impl SheetPlan {
     }
 }
 
-/// Draws the contact sheet of a rendering whose pictures were kept, as a PNG file: two rows a frame where there is a truth, else one.
+/// Draws the contact sheet of a rendering whose pictures were kept, as a PNG file: two rows a frame where
+/// there is a truth, else one.
 ///
 /// # Errors
 /// [`Error::Failed`] for a sheet that cannot be encoded.

@@ -1,8 +1,9 @@
-//! Displaced meshes as they are: the facets of the surface between the heights of their maps, and none of them in memory.
+//! Displaced meshes as they are: the facets of the surface between the heights of their maps, and none of
+//! them in memory.
 //!
-//! A triangle of the base mesh is cut into facets half a texel wide, displaced along its interpolated normals. What is in memory are boxes
-//! around groups of facets; a ray that enters one goes down to its facets by quarters, whose boxes come from the least and the greatest
-//! heights under them.
+//! A triangle of the base mesh is cut into facets half a texel wide, displaced along its interpolated
+//! normals. What is in memory are boxes around groups of facets; a ray that enters one goes down to its
+//! facets by quarters, whose boxes come from the least and the greatest heights under them.
 
 mod extremes;
 
@@ -61,8 +62,8 @@ struct Group {
     node: Node,
 }
 
-/// Part of a base triangle: with the second and third corner's weights in units of a cut, the corner (b, c), and `side` on from it on both
-/// axes, or back where that is negative.
+/// Part of a base triangle: with the second and third corner's weights in units of a cut, the corner (b, c),
+/// and `side` on from it on both axes, or back where that is negative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Node {
     b: u16,
@@ -182,7 +183,8 @@ impl Base<'_> {
         let high = corners.iter().fold(DVec2::NEG_INFINITY, |high, c| high.max(c.2));
         let [least, greatest] = extremes.between(low, high).map(|h| h * self.heights.depth);
         let (least, greatest) = (least.min(greatest), least.max(greatest));
-        // Between corners normals are mixed, shorter than one, and then made as long as one: heights along what was mixed are greater.
+        // Between corners normals are mixed, shorter than one, and then made as long as one: heights along
+        // what was mixed are greater.
         let mean = (corners[0].1 + corners[1].1 + corners[2].1).normalize_or_zero();
         let shortest = corners.iter().fold(1.0, |least: f64, c| least.min(c.1.dot(mean))).max(0.05);
         let lengths = [

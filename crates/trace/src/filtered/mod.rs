@@ -1,7 +1,8 @@
 //! Shading through a representation: one look-up a pixel, as wide as the pixel's reach on the map.
 //!
-//! Where the pixels around a pixel show another surface than its own, it is cut into 4 × 4 parts that are shaded apart, each at its own reach,
-//! as a rasteriser's multisampling would have it: what is measured is the filtering of maps, not of outlines.
+//! Where the pixels around a pixel show another surface than its own, it is cut into 4 × 4 parts that are
+//! shaded apart, each at its own reach, as a rasteriser's multisampling would have it: what is measured is
+//! the filtering of maps, not of outlines.
 
 mod baked;
 
@@ -27,7 +28,8 @@ use crate::incident_directions;
 /// Parts that a pixel with an outline in it is cut into, on each axis.
 const PARTS: usize = 4;
 
-/// The maps of a scene's materials, baked with one method. Camera, lights, BRDFs, models and meshes may change after.
+/// The maps of a scene's materials, baked with one method. Camera, lights, BRDFs, models and meshes may
+/// change after.
 pub struct BakedMaps {
     method: AnyMethod,
     materials: Vec<Baked>,
@@ -186,7 +188,8 @@ impl Filtered<'_> {
         sum / (PARTS * PARTS) as f64
     }
 
-    /// Light that comes from a hit (or from where nothing is hit), for a pixel at `at` that is `width` pixels wide.
+    /// Light that comes from a hit (or from where nothing is hit), for a pixel at `at` that is `width` pixels
+    /// wide.
     fn shade(
         &self,
         rays: &Rays,
@@ -238,7 +241,8 @@ fn outline(hits: &[Option<(Hit, Place)>], size: Size, i: usize) -> bool {
     around.into_iter().flatten().any(|j| match (&hits[i], &hits[j]) {
         (None, None) => false,
         (Some((hit, a)), Some((_, b))) => {
-            // Off the plane of the face by more than a twentieth of the distance, or turned by more than 60 degrees.
+            // Off the plane of the face by more than a twentieth of the distance, or turned by more than 60
+            // degrees.
             let off = (b.position - a.position).dot(a.face).abs() > 0.05 * hit.distance;
             a.object != b.object || off || a.face.dot(b.face) < 0.5
         }

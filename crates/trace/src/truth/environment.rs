@@ -1,7 +1,9 @@
-//! Light of an environment by chance: directions from where it is bright, from where the lobe is, and from where a diffuse facet looks.
+//! Light of an environment by chance: directions from where it is bright, from where the lobe is, and from
+//! where a diffuse facet looks.
 //!
-//! Each ray draws one direction of each kind, and every one counts by the sum of all their densities (the balance heuristic of Veach and
-//! Guibas 1995): what is likely by any of them is never divided by little. The environment is the picture itself, its sun included.
+//! Each ray draws one direction of each kind, and every one counts by the sum of all their densities (the
+//! balance heuristic of Veach and Guibas 1995): what is likely by any of them is never divided by little. The
+//! environment is the picture itself, its sun included.
 
 use std::f64::consts::{PI, TAU};
 
@@ -20,8 +22,8 @@ pub(super) struct SampledEnvironment<'a> {
 /// What the directions of one ray are drawn by: two numbers in [0, 1) for each kind.
 pub(super) type Numbers = [DVec2; 3];
 
-/// Numbers of a pixel's rays, one after the other spread more evenly than chance would have them: the sequence of Roberts 2018, of the
-/// plastic number, begun at random.
+/// Numbers of a pixel's rays, one after the other spread more evenly than chance would have them: the
+/// sequence of Roberts 2018, of the plastic number, begun at random.
 pub(super) fn numbers(begin: [[f64; 2]; 3], ray: usize) -> Numbers {
     const STEP: DVec2 = DVec2::new(0.754_877_666_246_692_8, 0.569_840_290_998_053_2);
     begin.map(|at| (DVec2::from(at) + STEP * ray as f64).fract())

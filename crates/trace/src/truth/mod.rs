@@ -1,9 +1,10 @@
 //! Brute force: what a pixel of a normal-mapped scene shows, by many rays, with the map as it is.
 //!
-//! Each ray shades one texel of the finest level, without masking or shadowing, so that a pixel tends to the plain mean of
-//! the BRDF over what it covers. Between texels the map is the bilinear mix of what the texels *reflect*, as texture units
-//! filter level 0: a ray takes the texel under a point displaced by up to half a texel either way, which has that mean.
-//! Nothing here knows of `ndfmap_core::ndf`. An environment's light is sampled, by `environment.rs`.
+//! Each ray shades one texel of the finest level, without masking or shadowing, so that a pixel tends to the
+//! plain mean of the BRDF over what it covers. Between texels the map is the bilinear mix of what the texels
+//! *reflect*, as texture units filter level 0: a ray takes the texel under a point displaced by up to half a
+//! texel either way, which has that mean. Nothing here knows of `ndfmap_core::ndf`. An environment's light is
+//! sampled, by `environment.rs`.
 
 mod environment;
 
@@ -92,7 +93,8 @@ impl<'a> Truth<'a> {
         }
     }
 
-    /// The same of a displaced scene: the meshes that have relief by its facets, and by `geometry` those that have none.
+    /// The same of a displaced scene: the meshes that have relief by its facets, and by `geometry` those that
+    /// have none.
     #[must_use]
     pub fn displaced(scene: &'a Scene, geometry: &'a Geometry, displacement: &'a DisplacedMeshes) -> Self {
         Self { displacement: Some(displacement), ..Self::new(scene, geometry) }
@@ -151,8 +153,9 @@ impl<'a> Truth<'a> {
         }
     }
 
-    /// The truth in every frame of a drift, twice, from independent rays: their mean is the truth, and half of what parts them
-    /// its noise. `rays` are those of one pixel in one frame, in both together; 512 at least.
+    /// The truth in every frame of a drift, twice, from independent rays: their mean is the truth, and half
+    /// of what parts them its noise. `rays` are those of one pixel in one frame, in both together; 512 at
+    /// least.
     ///
     /// # Errors
     /// [`Cancelled`] by the observer.
@@ -242,8 +245,8 @@ impl<'a> Truth<'a> {
         }
     }
 
-    /// Light that a facet of relief sends to the eye, made of what the texel `displaced` from it is. Where facets shade each other, a light
-    /// that something stands before adds nothing.
+    /// Light that a facet of relief sends to the eye, made of what the texel `displaced` from it is. Where
+    /// facets shade each other, a light that something stands before adds nothing.
     fn shade_facet(&self, facet: &Facet, eye: DVec3, (displaced, numbers): (DVec2, Numbers)) -> DVec3 {
         let finest = &self.materials[facet.material];
         let (x, y) = finest.texel(facet.uv, displaced);

@@ -1,5 +1,6 @@
-//! Published fits of the hundred MERL materials (Matusik et al. 2003): shifted-gamma (Bagher, Soler and Holzschuch 2012) and ABC (Löw et
-//! al. 2012). The numbers are those of J. Dupuy's `dj_brdf`, public domain; each row of the two files is a material.
+//! Published fits of the hundred MERL materials (Matusik et al. 2003): shifted-gamma (Bagher, Soler and
+//! Holzschuch 2012) and ABC (Löw et al. 2012). The numbers are those of J. Dupuy's `dj_brdf`, public domain;
+//! each row of the two files is a material.
 
 use std::f64::consts::PI;
 

@@ -1,8 +1,10 @@
-//! Factoring a table of measurements: `M(theta_h, theta_d) ~ kd + f(theta_h) g(theta_d)`, then f into kernels and g into a polynomial over a cosine.
+//! Factoring a table of measurements: `M(theta_h, theta_d) ~ kd + f(theta_h) g(theta_d)`, then f into kernels
+//! and g into a polynomial over a cosine.
 //!
-//! Alternating least squares, none of the factors negative, over the means of `phi_d`. Errors count relative to the reflectance around
-//! them, so that the tail counts beside a peak a thousand times as high, and by what a pair of directions exchanges: solid angle and both
-//! cosines, without which all would be about grazing angles. What is left of it all is measured over the table as it is, with no such weight.
+//! Alternating least squares, none of the factors negative, over the means of `phi_d`. Errors count relative
+//! to the reflectance around them, so that the tail counts beside a peak a thousand times as high, and by
+//! what a pair of directions exchanges: solid angle and both cosines, without which all would be about
+//! grazing angles. What is left of it all is measured over the table as it is, with no such weight.
 
 use std::f64::consts::PI;
 
@@ -14,8 +16,8 @@ use super::{LobeFactors, kernel};
 /// Bins of `theta_h` and of `theta_d` in a MERL table, to 90 degrees.
 pub const BINS: usize = 90;
 
-/// What a fit leaves of a table, as the root of the sum of squares over that of the table itself, each by solid angle, and times both
-/// cosines: what is exchanged.
+/// What a fit leaves of a table, as the root of the sum of squares over that of the table itself, each by
+/// solid angle, and times both cosines: what is exchanged.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Residual {
     /// Of `kd + f g`, as tabulated.
@@ -24,7 +26,8 @@ pub struct Residual {
     pub fitted: f64,
 }
 
-/// The half angle at a place in the table, in bins: MERL tables are finer towards the peak, `theta_h = (i/90)² 90°`.
+/// The half angle at a place in the table, in bins: MERL tables are finer towards the peak, `theta_h =
+/// (i/90)² 90°`.
 #[must_use]
 pub fn half_angle(i: f64) -> f64 {
     let part = i / BINS as f64;
@@ -47,7 +50,8 @@ fn directions(theta_h: f64, theta_d: f64, phi_d: f64) -> (DVec3, DVec3) {
     (wi, 2.0 * wi.dot(wh) * wh - wi)
 }
 
-/// Variances of the kernels: from a fiftieth of a degree to half the hemisphere, each 1.23 times the one before: between two of them any other is made to 1 %.
+/// Variances of the kernels: from a fiftieth of a degree to half the hemisphere, each 1.23 times the one
+/// before: between two of them any other is made to 1 %.
 const KERNELS: usize = 75;
 
 /// Sweeps of the descent over them.
@@ -215,8 +219,9 @@ impl Tables {
         alive.map(|(k, w)| (*w, variance(k))).collect()
     }
 
-    /// g times `cos² theta_d`, as a polynomial in `1 - cos theta_d`: reflectances have the two cosines to the normal below them, which for
-    /// the narrow half angles of a highlight are both that, and what is above them is smooth.
+    /// g times `cos² theta_d`, as a polynomial in `1 - cos theta_d`: reflectances have the two cosines to the
+    /// normal below them, which for the narrow half angles of a highlight are both that, and what is above
+    /// them is smooth.
     fn tint(&self, cells: &[Cell]) -> [DVec3; 6] {
         let mut normal = SMatrix::<f64, 6, 6>::zeros();
         let mut right = SMatrix::<f64, 6, 3>::zeros();
@@ -237,7 +242,8 @@ impl Tables {
     }
 }
 
-/// The reflectance that a tenth of the table, by weight, is darker than, channel by channel: where the highlight is not.
+/// The reflectance that a tenth of the table, by weight, is darker than, channel by channel: where the
+/// highlight is not.
 fn dim(cells: &[Cell]) -> DVec3 {
     let tenth = 0.1 * cells.iter().map(|c| c.weight).sum::<f64>();
     let of = |channel: usize| {

@@ -1,4 +1,5 @@
-// A measured lobe: a sum of kernels, and a colour. Twin of measured/mod.rs, which writes the numbers in; `base` is what it is widened by.
+// A measured lobe: a sum of kernels, and a colour. Twin of measured/mod.rs, which writes the numbers in;
+// `base` is what it is widened by.
 
 // True for a lobe around the half-vector.
 const SPECULAR: bool = true;

@@ -1,11 +1,13 @@
 //! Measured lobes: `kd + f(theta_h) g(theta_d)`, f a sum of kernels that widen in closed form, g a colour.
 //!
-//! Han et al. 2007, section 4, take measured materials in the factored form of Lawrence et al. 2006: f is a lobe around the half-vector,
-//! and g does not depend on the normal. The factors are fitted to a table of measurements (`factor.rs`), or to one that published fits
-//! stand in for (`analytic.rs`); what the fit leaves is in [`Residual`]. f is stored as a sum of von Mises-Fisher kernels, none of negative
-//! weight: convolving with a lobe of normals adds its variance to each kernel's, which is what the paper's zonal series
-//! `Σ Lambda_l rho_l Y_l0` does order by order, without its hundreds of orders for a shiny material (`docs/decisions.md`). With Han et al.'s
-//! factor `max(n·wi, 0)` the lobe is the measured reflectance itself.
+//! Han et al. 2007, section 4, take measured materials in the factored form of Lawrence et al. 2006: f is a
+//! lobe around the half-vector, and g does not depend on the normal. The factors are fitted to a table of
+//! measurements (`factor.rs`), or to one that published fits stand in for (`analytic.rs`); what the fit
+//! leaves is in [`Residual`]. f is stored as a sum of von Mises-Fisher kernels, none of negative weight:
+//! convolving with a lobe of normals adds its variance to each kernel's, which is what the paper's zonal
+//! series `Σ Lambda_l rho_l Y_l0` does order by order, without its hundreds of orders for a shiny material
+//! (`docs/decisions.md`). With Han et al.'s factor `max(n·wi, 0)` the lobe is the measured reflectance
+//! itself.
 
 mod analytic;
 mod factor;
@@ -40,7 +42,8 @@ pub struct LobeFactors {
     pub diffuse: DVec3,
     /// Kernels of f: weight, and variance on one axis.
     pub kernels: Vec<(f64, f64)>,
-    /// `g cos² theta_d` as a polynomial in `1 - cos theta_d`, from the constant up; below zero it counts as nothing.
+    /// `g cos² theta_d` as a polynomial in `1 - cos theta_d`, from the constant up; below zero it counts as
+    /// nothing.
     pub tint: [DVec3; 6],
     /// What the fit leaves.
     pub residual: Residual,
@@ -98,9 +101,10 @@ impl Measured {
         Ok(Self::new(&format!("{fit}:{name}"), 16, |wi, wo, _| Some(reflectance(wi, wo))))
     }
 
-    /// Factors a table of measurements: reflectance, RGB, for directions to the light and the eye (the normal is z), which `turns` bins of
-    /// `phi_d` from 0 to 180 degrees are asked for at every pair of `theta_h` and `theta_d`; the third number is the bin's, counted over
-    /// all, `(theta_h × 90 + theta_d) × turns + phi_d`. `None` where nothing was measured.
+    /// Factors a table of measurements: reflectance, RGB, for directions to the light and the eye (the normal
+    /// is z), which `turns` bins of `phi_d` from 0 to 180 degrees are asked for at every pair of `theta_h`
+    /// and `theta_d`; the third number is the bin's, counted over all, `(theta_h × 90 + theta_d) × turns +
+    /// phi_d`. `None` where nothing was measured.
     #[must_use]
     pub fn new(name: &str, turns: usize, reflectance: impl Fn(DVec3, DVec3, usize) -> Option<DVec3>) -> Self {
         let fit = factor::factor(turns, reflectance);
@@ -117,7 +121,8 @@ impl Measured {
     }
 }
 
-/// A von Mises-Fisher kernel of this variance, `1/kappa`, at the cosine `u`; its light over the sphere is one.
+/// A von Mises-Fisher kernel of this variance, `1/kappa`, at the cosine `u`; its light over the sphere is
+/// one.
 fn kernel(variance: f64, u: f64) -> f64 {
     let kappa = 1.0 / variance;
     kappa / (2.0 * PI * -(-2.0 * kappa).exp_m1()) * (kappa * (u - 1.0)).exp()
@@ -245,14 +250,16 @@ mod tests {
         assert!((lobe.fit.diffuse / PI - kd).length() < 0.01, "{}", lobe.fit.diffuse / PI);
         for (u, d) in [(1.0, 1.0), (0.99, 0.8), (0.98, 0.5)] {
             let (got, expected) = (lobe.evaluate(u) * lobe.tint(d), f(u) * g(d));
-            // Two kernels of the dictionary make one between them to 1 % (so does scipy's nonnegative least squares); descent has not quite ended.
+            // Two kernels of the dictionary make one between them to 1 % (so does scipy's nonnegative least
+            // squares); descent has not quite ended.
             assert!((got - expected).length() < 0.03 * expected.length(), "{u}: {got} {expected}");
         }
     }
 
     #[test]
     fn widening_is_the_zonal_series() {
-        // Han et al.'s series, to an order where it has ended: Lambda_l of normals of variance v against the same added to each kernel.
+        // Han et al.'s series, to an order where it has ended: Lambda_l of normals of variance v against the
+        // same added to each kernel.
         for name in ["blue-fabric", "gold-metallic-paint", "pearl-paint"] {
             let lobe = (SGD.parse)(name).unwrap();
             let v = 0.02;
@@ -270,8 +277,8 @@ mod tests {
                     sum += (2 * l + 1) as f64 / (4.0 * PI) * a * rho[l] * p;
                 }
                 let got = lobe.evaluate_widened(SlopeVariance::clamped(v), u);
-                // Variances add exactly for Gaussians in the plane; on the sphere to some 2 % of the peak at this width. The series itself
-                // rings by exp(-48² v/2), nothing.
+                // Variances add exactly for Gaussians in the plane; on the sphere to some 2 % of the peak at
+                // this width. The series itself rings by exp(-48² v/2), nothing.
                 assert!((got - sum).abs() < 0.02 * peak, "{name} at {u}: {got} {sum}");
             }
         }

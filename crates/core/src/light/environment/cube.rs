@@ -1,8 +1,9 @@
 //! A function of direction on the six faces of a cube, at several widths. Twin: `cube.wgsl`.
 //!
-//! A face's outermost texels lie on the cube's edges: their middles are at -1 and 1, and neighbouring faces have texels for the same
-//! directions there. So the plain bilinear mix within one face goes on without a seam in the next, on every device and here alike.
-//! Faces are those of graphics interfaces: +x, -x, +y, -y, +z, -z.
+//! A face's outermost texels lie on the cube's edges: their middles are at -1 and 1, and neighbouring faces
+//! have texels for the same directions there. So the plain bilinear mix within one face goes on without a
+//! seam in the next, on every device and here alike. Faces are those of graphics interfaces: +x, -x, +y, -y,
+//! +z, -z.
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
@@ -26,7 +27,8 @@ pub struct Cube {
     side: usize,
 }
 
-/// Direction, not of unit length, to a place on a face: `s` to the right, `t` down, both from -1 to 1 (and beyond, to the sides).
+/// Direction, not of unit length, to a place on a face: `s` to the right, `t` down, both from -1 to 1 (and
+/// beyond, to the sides).
 #[must_use]
 pub fn cube_direction(face: usize, s: f64, t: f64) -> DVec3 {
     match face {
@@ -54,7 +56,8 @@ pub(super) fn cube_place(w: DVec3) -> (usize, DVec2) {
 }
 
 impl Cube {
-    /// An environment on a cube: about as fine as it is, and in each coarser level the mean over a texel's solid angle.
+    /// An environment on a cube: about as fine as it is, and in each coarser level the mean over a texel's
+    /// solid angle.
     #[must_use]
     pub fn of(environment: &Environment) -> Self {
         let side = (environment.size().height / 2).next_power_of_two().clamp(4 * LEAST_SIDE, MOST_SIDE);
@@ -134,7 +137,8 @@ impl Cube {
     }
 }
 
-/// The level with one value for each direction: that of a texel on an edge is the mean of those that the faces around have for it.
+/// The level with one value for each direction: that of a texel on an edge is the mean of those that the
+/// faces around have for it.
 fn joined(side: usize, level: Vec<Vec3>) -> Vec<Vec3> {
     let mut joined = level.clone();
     let last = side - 1;
@@ -165,8 +169,8 @@ fn place(i: usize, side: usize) -> f64 {
     2.0 * i as f64 / (side - 1) as f64 - 1.0
 }
 
-/// Mean of a function over a texel, by solid angle. A place on a face's plane counts `(1 + s² + t²)^-3/2`; where the texel reaches beyond
-/// the edge, so does the plane.
+/// Mean of a function over a texel, by solid angle. A place on a face's plane counts `(1 + s² + t²)^-3/2`;
+/// where the texel reaches beyond the edge, so does the plane.
 fn mean_around(side: usize, (face, at): (usize, DVec2), f: impl Fn(DVec3) -> DVec3) -> DVec3 {
     let step = 2.0 / (side - 1) as f64;
     let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
@@ -216,7 +220,8 @@ mod tests {
         let cube = Cube::of(&smooth(Size { width: 512, height: 256 }));
         assert_eq!((cube.side(), cube.levels()), (128, 6));
         for w in [DVec3::X, DVec3::new(0.6, -0.64, 0.48), DVec3::new(0.5, 0.5, -0.707).normalize()] {
-            // Texels of the picture are 0.7 degrees, and a face's 0.9: 0.02 of what changes by at most 1 in a radian.
+            // Texels of the picture are 0.7 degrees, and a face's 0.9: 0.02 of what changes by at most 1 in a
+            // radian.
             assert!((cube.lookup(w, 0.0) - smooth_radiance(w)).length() < 0.015, "{w}");
         }
     }

@@ -1,7 +1,8 @@
 // An environment as shading looks it up. Twin of filtered.rs.
 //
-// A host brings `environment`, a uniform; `environment_radiance` and `environment_blurred`, the cubes, as functions of a direction and a
-// level; `half_vector_coefficient`, of a view and an index; and `split_sum_texel`, of a column and a row.
+// A host brings `environment`, a uniform; `environment_radiance` and `environment_blurred`, the cubes, as
+// functions of a direction and a level; `half_vector_coefficient`, of a view and an index; and
+// `split_sum_texel`, of a column and a row.
 
 // Techniques, as numbered by `Technique::index`; 0 is no environment.
 const PREFILTERED: u32 = 1u;
@@ -10,7 +11,8 @@ const HARMONICS: u32 = 2u;
 struct Environment {
     // From directions of the world to the environment's own.
     rotation: mat3x3<f32>,
-    // Nine harmonics of its light, small bright sources apart; and in w of the first three, red, green and blue of the least that a normal receives.
+    // Nine harmonics of its light, small bright sources apart; and in w of the first three, red, green and
+    // blue of the least that a normal receives.
     irradiance: array<vec4<f32>, 9>,
     // Texels on a side of the cubes' finest level, and how many levels there are.
     size: vec2<f32>,

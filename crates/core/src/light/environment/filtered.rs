@@ -11,7 +11,8 @@ use crate::light::Light;
 /// How lobes of normals meet an environment's highlights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Technique {
-    /// Each lobe looks up a cube that microfacets as wide as it have blurred, where what it reflects comes from.
+    /// Each lobe looks up a cube that microfacets as wide as it have blurred, where what it reflects comes
+    /// from.
     #[default]
     Prefiltered,
     /// Han et al.'s sum over spherical harmonics of the half-vector, to order 8.
@@ -79,8 +80,8 @@ impl FilteredEnvironment {
         made.get_or_init(|| microfacets.filter(&self.radiance))
     }
 
-    /// Makes now what a technique wants of it. What is made when first asked for is made by all threads together, and must not be asked for
-    /// first from within what they already do together.
+    /// Makes now what a technique wants of it. What is made when first asked for is made by all threads
+    /// together, and must not be asked for first from within what they already do together.
     pub fn make(&self, technique: Technique, microfacets: Microfacets) {
         match technique {
             Technique::Prefiltered => drop(self.prefiltered(microfacets)),

@@ -1,8 +1,9 @@
 //! Light over half-vectors: Han et al. 2007, section 8, equation 26. Twin: `half_vectors.wgsl`.
 //!
-//! For one view, a lobe around the half-vector meets `L'(wh) = L(wi(wh, wo)) 4 (wi·wh)`, and what an effective lobe reflects of it is again a
-//! sum over spherical harmonics, `Σ Lambda_l rho_l L'_lm Y_lm(mu)`. The views are precomputed on a grid of 16 × 16 directions, in the
-//! environment's own frame, and shading is interpolated between four: so both the eye and the light may turn from frame to frame.
+//! For one view, a lobe around the half-vector meets `L'(wh) = L(wi(wh, wo)) 4 (wi·wh)`, and what an
+//! effective lobe reflects of it is again a sum over spherical harmonics, `Σ Lambda_l rho_l L'_lm Y_lm(mu)`.
+//! The views are precomputed on a grid of 16 × 16 directions, in the environment's own frame, and shading is
+//! interpolated between four: so both the eye and the light may turn from frame to frame.
 
 use std::f64::consts::{PI, TAU};
 
@@ -31,8 +32,8 @@ pub struct HalfVectors {
 }
 
 impl HalfVectors {
-    /// Projects an environment. An integral over half-vectors is one over the light's directions, whose solid angle is `4 (wi·wh)` times
-    /// as large, so texels count by their own.
+    /// Projects an environment. An integral over half-vectors is one over the light's directions, whose solid
+    /// angle is `4 (wi·wh)` times as large, so texels count by their own.
     #[must_use]
     pub fn of(environment: &Environment) -> Self {
         let light = environment.beams(TEXELS);
@@ -57,7 +58,8 @@ impl HalfVectors {
         &self.coefficients
     }
 
-    /// `Σ zonal_l L'_lm Y_lm(mu)` for an eye in a direction: between the four views around it. What rings below zero is held there.
+    /// `Σ zonal_l L'_lm Y_lm(mu)` for an eye in a direction: between the four views around it. What rings
+    /// below zero is held there.
     #[must_use]
     pub fn evaluate(&self, wo: DVec3, mu: DVec3, zonal: &[f64; HALF_VECTOR_ORDER + 1]) -> DVec3 {
         let mut basis = [0.0; COUNT];

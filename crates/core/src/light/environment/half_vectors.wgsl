@@ -32,7 +32,8 @@ fn half_vector_between(around: ViewsAround, i: u32) -> vec3<f32> {
         + half_vector_coefficient(around.views.w, i) * around.weights.w;
 }
 
-// The series for a lobe of this spread around `mu`, for an eye in direction `wo`. What rings below zero is held there.
+// The series for a lobe of this spread around `mu`, for an eye in direction `wo`. What rings below zero is
+// held there.
 fn over_half_vectors(wo: vec3<f32>, mu: vec3<f32>, spread: f32, printed: bool) -> vec3<f32> {
     let around = views_around(wo);
     var sum = vec3<f32>(0.0);

@@ -1,7 +1,8 @@
 //! An environment in spherical harmonics, and the irradiance of normals that stray.
 //!
-//! Ramamoorthi and Hanrahan 2001: Lambert's cosine is so wide that orders to 2 carry nearly all of an irradiance. Han et al. 2007,
-//! equation 25: normals of a lobe take from order l what they leave of it, `Lambda_l`.
+//! Ramamoorthi and Hanrahan 2001: Lambert's cosine is so wide that orders to 2 carry nearly all of an
+//! irradiance. Han et al. 2007, equation 25: normals of a lobe take from order l what they leave of it,
+//! `Lambda_l`.
 
 use std::f64::consts::PI;
 
@@ -26,8 +27,9 @@ pub struct Harmonics {
 }
 
 impl Harmonics {
-    /// Projects an environment: the sum over its texels, each by its solid angle. Harmonics are taken at the middles of texels, which for
-    /// the orders here and a picture of `h` rows costs at most `(pi k / h)²/24` of what is there, k being the order plus that of what the picture shows.
+    /// Projects an environment: the sum over its texels, each by its solid angle. Harmonics are taken at the
+    /// middles of texels, which for the orders here and a picture of `h` rows costs at most `(pi k / h)²/24`
+    /// of what is there, k being the order plus that of what the picture shows.
     ///
     /// # Panics
     /// For an order above [`crate::sphere::MAX_SH_ORDER`].
@@ -80,8 +82,8 @@ const FEW_TEXELS: usize = 64;
 pub struct Irradiance {
     /// Its light, to order 2.
     pub light: Harmonics,
-    /// The least that a normal receives of it, whatever it faces. Order 2 is off by up to 3/32 of a small lamp, below zero too: nothing is
-    /// darker than this.
+    /// The least that a normal receives of it, whatever it faces. Order 2 is off by up to 3/32 of a small
+    /// lamp, below zero too: nothing is darker than this.
     pub least: DVec3,
 }
 
@@ -96,8 +98,8 @@ impl Irradiance {
         Self { light: Harmonics::of(environment, IRRADIANCE_ORDER), least }
     }
 
-    /// Irradiance of normals that stray around a direction, by Han et al.'s equation 25: `Lambda_l` as [`zonal_of_normals`] has it, or as
-    /// `printed`, `exp(-l² variance/2)`.
+    /// Irradiance of normals that stray around a direction, by Han et al.'s equation 25: `Lambda_l` as
+    /// [`zonal_of_normals`] has it, or as `printed`, `exp(-l² variance/2)`.
     #[must_use]
     pub fn of_normals(&self, normal: DVec3, variance: f64, printed: bool) -> DVec3 {
         let lambda = if printed {
@@ -110,8 +112,9 @@ impl Irradiance {
     }
 }
 
-/// What a von Mises-Fisher lobe of normals leaves of orders 0, 1 and 2: `1, coth(kappa) - 1/kappa, 1 - 3 A_1/kappa`, with
-/// `variance = 1/kappa`. Their product with a lobe's own coefficients is the convolution, exactly.
+/// What a von Mises-Fisher lobe of normals leaves of orders 0, 1 and 2: `1, coth(kappa) - 1/kappa, 1 - 3
+/// A_1/kappa`, with `variance = 1/kappa`. Their product with a lobe's own coefficients is the convolution,
+/// exactly.
 #[must_use]
 pub fn zonal_of_normals(variance: f64) -> [f64; 3] {
     let kappa = 1.0 / variance.max(1e-12);
@@ -140,7 +143,8 @@ mod tests {
 
     #[test]
     fn a_smooth_sky_comes_back() {
-        // Order 2, so nothing is cut off. What is left is the middles of texels: of products of order 6 at most, (6 pi/128)²/24 = 9e-4.
+        // Order 2, so nothing is cut off. What is left is the middles of texels: of products of order 6 at
+        // most, (6 pi/128)²/24 = 9e-4.
         let e = smooth(Size { width: 256, height: 128 });
         let harmonics = Harmonics::of(&e, 4);
         for w in [DVec3::Y, DVec3::new(0.6, -0.64, 0.48), DVec3::new(-0.8, 0.0, 0.6)] {
@@ -154,7 +158,8 @@ mod tests {
         let size = Size { width: 128, height: 64 };
         let constant = Environment::new(Grid::from_fn(size, |_, _| Vec3::splat(0.5))).unwrap();
         let e = Irradiance::of(&constant).of_normals(DVec3::new(0.6, 0.0, 0.8), 0.1, false);
-        // Solid angles are exact, order 0 is too; orders 1 and 2 vanish by symmetry but for the middles of texels.
+        // Solid angles are exact, order 0 is too; orders 1 and 2 vanish by symmetry but for the middles of
+        // texels.
         assert!((e - DVec3::splat(0.5 * PI)).length() < 1e-3, "{e}");
         let mut one = Grid::from_fn(size, |_, _| Vec3::ZERO);
         let (x, y) = constant.texel(DVec3::Y + 1e-9 * DVec3::X);
@@ -165,7 +170,8 @@ mod tests {
         for angle in [0.0, 0.5, 1.0_f64] {
             let (side, _) = crate::sphere::frame(towards);
             let n = towards * angle.cos() + side * angle.sin();
-            // Known of order 2: 1/4 + u/2 + 5/32 (3u² - 1), which is off max(u, 0) by at most 3/32 (at u = 0 and 1).
+            // Known of order 2: 1/4 + u/2 + 5/32 (3u² - 1), which is off max(u, 0) by at most 3/32 (at u = 0
+            // and 1).
             let u = angle.cos();
             let expected = 0.25 + 0.5 * u + 5.0 / 32.0 * (3.0 * u * u - 1.0);
             assert!((irradiance.of_normals(n, 0.0, false).x - expected).abs() < 1e-6);
@@ -175,8 +181,9 @@ mod tests {
 
     #[test]
     fn nothing_is_darker_than_what_a_normal_receives() {
-        // A lamp of irradiance 1 in a dim room, 0.01 from everywhere: its back is lit by the room, pi/100 = 0.031, where order 2 has
-        // nothing: the lamp rings to 1/4 - 1/5 - 5/32 0.52 = -0.031 there, at u = -0.4, and takes away what the room gives.
+        // A lamp of irradiance 1 in a dim room, 0.01 from everywhere: its back is lit by the room, pi/100 =
+        // 0.031, where order 2 has nothing: the lamp rings to 1/4 - 1/5 - 5/32 0.52 = -0.031 there, at u =
+        // -0.4, and takes away what the room gives.
         let size = Size { width: 128, height: 64 };
         let mut room = Grid::from_fn(size, |_, _| Vec3::splat(0.01));
         let lamp = 1.0 / Environment::new(room.clone()).unwrap().solid_angle(20);

@@ -15,8 +15,9 @@ fn zonal_of_normals(variance: f32) -> vec2<f32> {
     return vec2<f32>(first, 1.0 - 3.0 * v * first);
 }
 
-// Irradiance of normals of this variance around a direction, in the environment's frame (Han et al. 2007, equation 25). Nothing is
-// darker than the least that a normal receives. The constants are those of the harmonics: sqrt(1/4 pi), sqrt(3/4 pi), sqrt(15/4 pi), sqrt(5/16 pi).
+// Irradiance of normals of this variance around a direction, in the environment's frame (Han et al. 2007,
+// equation 25). Nothing is darker than the least that a normal receives. The constants are those of the
+// harmonics: sqrt(1/4 pi), sqrt(3/4 pi), sqrt(15/4 pi), sqrt(5/16 pi).
 fn environment_irradiance(n: vec3<f32>, variance: f32, printed: bool) -> vec3<f32> {
     var lambda = zonal_of_normals(variance);
     if printed {

@@ -1,11 +1,11 @@
 //! Light from everywhere: a picture of it by latitude and longitude, and what shading makes of it.
 //!
-//! The picture is what it says, texel by texel: radiance is constant over a texel, and a texel has its exact solid angle. y is up; the
-//! middle of the picture is seen looking along -z, and x is on its right.
+//! The picture is what it says, texel by texel: radiance is constant over a texel, and a texel has its exact
+//! solid angle. y is up; the middle of the picture is seen looking along -z, and x is on its right.
 //!
-//! [`Environment`] is the light itself, for truths. [`FilteredEnvironment`] is what shading looks up: small bright sources apart
-//! (`sun.rs`), spherical harmonics (`harmonics.rs`), cubes that are filtered wider and wider (`cube.rs`, `prefilter.rs`), and Han et al.'s
-//! light over half-vectors (`half_vectors.rs`).
+//! [`Environment`] is the light itself, for truths. [`FilteredEnvironment`] is what shading looks up: small
+//! bright sources apart (`sun.rs`), spherical harmonics (`harmonics.rs`), cubes that are filtered wider and
+//! wider (`cube.rs`, `prefilter.rs`), and Han et al.'s light over half-vectors (`half_vectors.rs`).
 
 pub mod builtin;
 mod cube;
@@ -117,7 +117,8 @@ impl Environment {
         (0..self.size().height).map(row).sum::<DVec3>() / (4.0 * PI)
     }
 
-    /// Light as directions, and radiance times the solid angle that it comes from: of every texel, [`Self::reduced`] to about `width` of them around.
+    /// Light as directions, and radiance times the solid angle that it comes from: of every texel,
+    /// [`Self::reduced`] to about `width` of them around.
     pub(super) fn beams(&self, width: usize) -> Vec<(DVec3, DVec3)> {
         let few = self.reduced(width);
         let Size { width, height } = few.size();
@@ -129,8 +130,9 @@ impl Environment {
         texels.map(beam).collect()
     }
 
-    /// The same light in fewer texels, each the mean of those it holds by solid angle: the longest side that halving leaves at `width` or above.
-    /// Of odd sides the last row or column stays alone, though it is as wide as the others then: directions stray by a texel of the larger.
+    /// The same light in fewer texels, each the mean of those it holds by solid angle: the longest side that
+    /// halving leaves at `width` or above. Of odd sides the last row or column stays alone, though it is as
+    /// wide as the others then: directions stray by a texel of the larger.
     fn reduced(&self, width: usize) -> Self {
         let mut all = self.clone();
         while all.size().width / 2 >= width {
@@ -201,8 +203,8 @@ pub(crate) mod tests {
         // Single floats.
         assert!((few.mean() - e.mean()).length() < 1e-6);
         assert_eq!(e.reduced(65).size(), e.size());
-        // Odd sides too are reduced, else what is done with few texels might never end. Directions stray by pi/255 at most, halfway to the
-        // last row, of light that changes by less than its mean a radian.
+        // Odd sides too are reduced, else what is done with few texels might never end. Directions stray by
+        // pi/255 at most, halfway to the last row, of light that changes by less than its mean a radian.
         let odd = smooth(Size { width: 511, height: 255 });
         let few = odd.reduced(64);
         assert_eq!(few.size(), Size { width: 64, height: 32 });

@@ -1,9 +1,10 @@
 //! Cubes that microfacets have blurred: what a rough mirror of each width shows, seen straight on.
 //!
-//! The split of Karis 2013 that engines have: light is averaged by the lobe as if normal, eye and mirror direction were one, and what the
-//! lobe reflects in all comes from a table (`split_sum.rs`). Level k of n is perceptual roughness k/(n-1), so level 0 is the environment.
-//! Each texel is a sum over directions that stand for equal shares of the lobe, each looked up as wide as its share of solid angle
-//! (Krivanek and Colbert 2008): nothing is drawn at random, and nothing is missed between directions.
+//! The split of Karis 2013 that engines have: light is averaged by the lobe as if normal, eye and mirror
+//! direction were one, and what the lobe reflects in all comes from a table (`split_sum.rs`). Level k of n is
+//! perceptual roughness k/(n-1), so level 0 is the environment. Each texel is a sum over directions that
+//! stand for equal shares of the lobe, each looked up as wide as its share of solid angle (Krivanek and
+//! Colbert 2008): nothing is drawn at random, and nothing is missed between directions.
 
 use std::f64::consts::{PI, TAU};
 
@@ -139,7 +140,8 @@ mod tests {
             for level in 1..cube.levels() {
                 let alpha_squared = (level as f64 / (cube.levels() - 1) as f64).powi(4);
                 let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
-                // Over the mirror's cosine to the normal, sixty-four nodes to a panel that halves towards the peak.
+                // Over the mirror's cosine to the normal, sixty-four nodes to a panel that halves towards the
+                // peak.
                 let mut end = 1.0;
                 for panel in 0..24 {
                     let start = if panel == 23 { 0.0 } else { end / 2.0 };

@@ -103,8 +103,9 @@ mod tests {
             light += e.radiance(w) / density;
             inside += u32::from(w.y > 0.0);
         }
-        // Light over density is constant but for colour: the mean of the colours' sum is exact, that of one is off by noise, whose
-        // deviation here is at most the mean itself over the root of 20 000, thrice of which is 2 %.
+        // Light over density is constant but for colour: the mean of the colours' sum is exact, that of one
+        // is off by noise, whose deviation here is at most the mean itself over the root of 20 000, thrice of
+        // which is 2 %.
         let expected = e.mean() * 2.0 * TAU;
         let mean = light / f64::from(count);
         assert!((mean.element_sum() - expected.element_sum()).abs() < 1e-9 * expected.element_sum());

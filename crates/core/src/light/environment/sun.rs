@@ -1,9 +1,10 @@
 //! Small bright sources, taken out of an environment to shine as lights of their own.
 //!
-//! A sun of one texel can be 100 000 times as bright as the sky. In spherical harmonics it rings over the whole sphere, and in a cube it is
-//! either missed or smeared over a texel. So texels above [`CONTRAST`] times the mean are grouped; of a group that is small, what is above
-//! that level becomes a directional light, and the rest stays. Nothing is lost: light and what is left add up to what was there. Groups
-//! that are large (a window) or faint are left alone.
+//! A sun of one texel can be 100 000 times as bright as the sky. In spherical harmonics it rings over the
+//! whole sphere, and in a cube it is either missed or smeared over a texel. So texels above [`CONTRAST`]
+//! times the mean are grouped; of a group that is small, what is above that level becomes a directional
+//! light, and the rest stays. Nothing is lost: light and what is left add up to what was there. Groups that
+//! are large (a window) or faint are left alone.
 
 use glam::{DVec3, Vec3};
 
@@ -13,7 +14,8 @@ use crate::light::Light;
 /// How much brighter than the mean over the sphere a texel of a source is.
 const CONTRAST: f32 = 50.0;
 
-/// A source is small when its directions stray by less than this, as a root of the mean square, in radians: 2.5 degrees.
+/// A source is small when its directions stray by less than this, as a root of the mean square, in radians:
+/// 2.5 degrees.
 const SMALL: f64 = 0.044;
 
 /// A source is bright when this share of all light is above the level.
