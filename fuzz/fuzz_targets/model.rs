@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
-use ndfmap_core::scene::SceneOptions;
+use ndfmap_scene::SceneOptions;
 use ndfmap_maps::model::{ModelOptions, model_of_bytes};
 
 fuzz_target!(|bytes: &[u8]| {

@@ -158,9 +158,6 @@ const SHARED: [&str; 4] = [
     include_str!("ndf/reflect.wgsl"),
 ];
 
-/// Points of cut meshes, the twin of [`crate::scene::tessellation`].
-pub const TESSELLATION: &str = include_str!("scene/tessellation.wgsl");
-
 /// Filtered look-ups, the twin of [`crate::lookup`].
 pub const LOOKUP: &str = include_str!("lookup.wgsl");
 

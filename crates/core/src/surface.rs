@@ -10,8 +10,6 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use crate::grid::{Grid, Size};
-use crate::ndf::Method;
-use crate::pyramid::Pyramid;
 
 /// What lies beyond the edge of a map, on one axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -144,11 +142,6 @@ pub trait Surface: Send + Sync {
 
     /// The same with the slopes that the surface between its heights has, where it can tell them.
     fn with_exact_slopes(&self) -> Option<Arc<dyn Surface>> {
-        None
-    }
-
-    /// The map of it as a method reads it, where it comes with one that was baked before.
-    fn baked(&self, _method: &dyn Method) -> Option<Pyramid> {
         None
     }
 }

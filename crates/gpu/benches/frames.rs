@@ -10,14 +10,15 @@ use std::time::Instant;
 use ndfmap_core::grid::Size;
 use ndfmap_core::light::environment::{SceneEnvironment, Technique, builtin};
 use ndfmap_core::lookup::{Filtering, Lookups, Sampling};
-use ndfmap_core::metrics::{color_error, relative_l2};
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::observe::Unobserved;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{self, Effort, Scene, SceneOptions};
 use ndfmap_gpu::{
     Antialiasing, Canvas, Device, FinestMaps, Frame, Geometry, Maps, Meshes, Renderer, SceneView, TrueFrame,
 };
+use ndfmap_scene as scene;
+use ndfmap_scene::metrics::{color_error, relative_l2};
+use ndfmap_scene::{Effort, Scene, SceneOptions};
 
 const METHODS: &[&str] = &[
     "toksvig",

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use ndfmap_core::grid::{Grid, Size};
-use ndfmap_core::metrics::Picture;
+use ndfmap_scene::metrics::Picture;
 
 use crate::{Device, GpuError};
 

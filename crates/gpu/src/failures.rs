@@ -3,7 +3,8 @@
 use ndfmap_core::grid::Size;
 use ndfmap_core::lookup::Lookups;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{self, Scene, SceneOptions};
+use ndfmap_scene as scene;
+use ndfmap_scene::{Scene, SceneOptions};
 
 use crate::{Antialiasing, Canvas, Device, Frame, Geometry, GpuError, Maps, Renderer, SceneView};
 use ndfmap_core::ndf::AnyMethod;

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Mat2, Vec3, Vec4};
-use ndfmap_core::scene::{Mesh, Object, Scene, Vertex};
+use ndfmap_scene::{Mesh, Object, Scene, Vertex};
 
 use crate::{Device, GpuError};
 

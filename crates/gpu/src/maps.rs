@@ -11,9 +11,9 @@ use ndfmap_core::lookup::{Lookup, Texels};
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::observe::Observer;
 use ndfmap_core::pyramid::{Precision, Pyramid};
-use ndfmap_core::scene::{BakedMaterial, Material, SurfaceTextures};
 use ndfmap_core::surface::{SurfaceRow, Wrap, Wraps};
 use ndfmap_core::units::SlopeVariance;
+use ndfmap_scene::{BakedMaterial, Material, SurfaceTextures};
 
 use crate::{Device, GpuError};
 
@@ -106,12 +106,12 @@ impl Textures {
 
     /// Normals of the finest level, one by one, and what they are made of: for the truth.
     pub(crate) fn finest(device: &Device, material: &Material) -> Result<Self, GpuError> {
-        let (size, wraps) = (material.surface.size(), material.surface.wraps());
+        let (size, wraps) = (material.map.size(), material.map.wraps());
         let what = format!("the map of material `{}`", material.name);
         let mut row = SurfaceRow::flat(size.width);
         let mut values = Vec::with_capacity(4 * size.area());
         for y in 0..size.height {
-            material.surface.read_row(y, &mut row);
+            material.map.read_row(y, &mut row);
             values.extend((0..size.width).flat_map(|x| row.normal(x).extend(0.0).to_array()));
         }
         let layout = Stored { layers: 1, levels: 1, format: wgpu::TextureFormat::Rgba32Float };

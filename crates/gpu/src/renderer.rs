@@ -9,8 +9,8 @@ use ndfmap_core::light::SplitSum;
 use ndfmap_core::light::environment::SceneEnvironment;
 use ndfmap_core::lookup::{Lookups, Sampling};
 use ndfmap_core::ndf::AnyMethod;
-use ndfmap_core::scene::{Camera, Material, Scene};
 use ndfmap_core::surface::Wraps;
+use ndfmap_scene::{Camera, Material, Scene};
 
 use crate::canvas::{Antialiasing, Canvas, DEPTH, Keep, PARTS, PassTarget, Target, TargetFormat};
 use crate::device::record_dispatch;

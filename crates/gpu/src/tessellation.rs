@@ -8,13 +8,12 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use ndfmap_core::grid::Size;
 use ndfmap_core::lookup::Texels;
-use ndfmap_core::scene::tessellation::{HEIGHT_PIXELS, Plan, plan};
-use ndfmap_core::scene::{Camera, Displacement, Object, Scene};
 use ndfmap_core::surface::Wrap;
+use ndfmap_scene::tessellation::{HEIGHT_PIXELS, Plan, TESSELLATION, plan};
+use ndfmap_scene::{Camera, Displacement, Object, Scene};
 
 use crate::geometry::{Corner, Geometry, Part, Triangle, corner, triangle};
 use crate::{Device, GpuError};
-use ndfmap_core::shader::TESSELLATION;
 
 /// What both passes share.
 const HEIGHTS: &str =
@@ -158,7 +157,7 @@ impl<'a> Meshes<'a> {
         if plan.patches.is_empty() {
             return;
         }
-        let of = |p: &ndfmap_core::scene::tessellation::Patch| {
+        let of = |p: &ndfmap_scene::tessellation::Patch| {
             let [a, b, c] = p.edges;
             [p.triangle, p.segments, a, b, c, p.first_point, p.first_triangle]
         };

@@ -7,9 +7,9 @@
 
 use glam::{DVec2, DVec3};
 use ndfmap_core::grid::Grid;
-use ndfmap_core::metrics::relative_l2;
 use ndfmap_core::observe::Observer;
-use ndfmap_core::scene::{Camera, Effort, Material, TruePicture};
+use ndfmap_scene::metrics::relative_l2;
+use ndfmap_scene::{Camera, Effort, Material, TruePicture};
 
 use crate::canvas::{Antialiasing, Canvas};
 use crate::maps::Textures;

@@ -6,8 +6,8 @@ use ndfmap_core::grid::Size;
 use ndfmap_core::light::Light;
 use ndfmap_core::lookup::{Filtering, Sampling};
 use ndfmap_core::ndf::Method;
-use ndfmap_core::scene::{Camera, Material};
 use ndfmap_core::surface::Wrap;
+use ndfmap_scene::{Camera, Material};
 
 use crate::geometry::Geometry;
 use crate::maps::Textures;

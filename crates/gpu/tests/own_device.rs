@@ -11,16 +11,16 @@ use glam::Vec3;
 use half::f16;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::lookup::Lookups;
-use ndfmap_core::metrics::{Picture, relative_l2};
 use ndfmap_core::ndf::{AnyMethod, Vmf};
 use ndfmap_core::observe::{Cancelled, Observer, Unobserved};
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{self, Effort, Scene, SceneOptions};
-use ndfmap_gpu::wgpu;
 use ndfmap_gpu::{
     Antialiasing, Canvas, Device, FinestMaps, Frame, Geometry, GpuError, Maps, Renderer, SceneView, Target,
-    TrueFrame,
+    TrueFrame, wgpu,
 };
+use ndfmap_scene as scene;
+use ndfmap_scene::metrics::{Picture, relative_l2};
+use ndfmap_scene::{Effort, Scene, SceneOptions};
 
 const SIZE: Size = Size { width: 128, height: 96 };
 
@@ -117,8 +117,7 @@ fn a_frame_is_recorded_into_the_callers_commands() {
     assert!(apart < 1.0 / 1024.0, "{apart}");
 
     // Over what is there: of a scene turned away from, nothing is drawn, and all is kept.
-    let away =
-        ndfmap_core::scene::Camera { target: 2.0 * scene.camera.eye - scene.camera.target, ..scene.camera };
+    let away = ndfmap_scene::Camera { target: 2.0 * scene.camera.eye - scene.camera.target, ..scene.camera };
     let view = SceneView { camera: &away, ..view };
     let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     let over = Target { keep: true, ..Target::new(&own, texture.format()) };

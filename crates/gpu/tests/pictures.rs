@@ -9,15 +9,16 @@ use ndfmap_core::brdf::AnyLobe;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::environment::{SceneEnvironment, Technique, builtin};
 use ndfmap_core::lookup::{Filtering, Lookups, Sampling};
-use ndfmap_core::metrics::{Picture, display, relative_l2};
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::observe::Unobserved;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{self, Effort, Scene, SceneOptions, SurfaceTextures};
 use ndfmap_core::{brdf, ndf};
 use ndfmap_gpu::{
     Antialiasing, Canvas, FinestMaps, Frame, Geometry, Maps, Meshes, Renderer, SceneView, TrueFrame,
 };
+use ndfmap_scene as scene;
+use ndfmap_scene::metrics::{Picture, display, relative_l2};
+use ndfmap_scene::{Effort, Scene, SceneOptions, SurfaceTextures};
 use ndfmap_trace::filtered::{BakedMaps, Filtered};
 use ndfmap_trace::truth::Truth;
 

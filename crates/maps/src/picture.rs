@@ -6,7 +6,7 @@ use std::path::Path;
 use exr::prelude::{Encoding, Image as ExrImage, LineOrder, SpecificChannels, WritableImage};
 use glam::Vec3;
 use ndfmap_core::grid::{Grid, Size};
-use ndfmap_core::metrics::{Picture, display};
+use ndfmap_scene::metrics::{Picture, display};
 
 use crate::{MapError, atomic};
 

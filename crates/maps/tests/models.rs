@@ -5,9 +5,9 @@
 use std::path::Path;
 
 use glam::{DVec3, Vec2, Vec3};
-use ndfmap_core::scene::{Scene, SceneOptions};
 use ndfmap_maps::MapError;
 use ndfmap_maps::model::{ModelOptions, TABLE, model_of_bytes, read_model};
+use ndfmap_scene::{MaterialMap, Scene, SceneOptions};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -106,7 +106,7 @@ fn gltf_materials_are_read() {
     let (scene, _) = read("a.gltf", &gltf()).unwrap();
     let material = &scene.materials[scene.objects[0].material];
     let mut row = ndfmap_core::surface::SurfaceRow::flat(2);
-    material.surface.read_row(0, &mut row);
+    material.map.read_row(0, &mut row);
     // 218 is 0.71: a normal at 45 degrees, whose x is then halved by the texture's scale. 8 bits: 1/255.
     let expected = Vec3::new(0.5, 0.0, 1.0).normalize();
     assert!((row.normal(0) - Vec3::Z).length() < 0.01 && (row.normal(1) - expected).length() < 0.01);
@@ -205,7 +205,7 @@ fn gltf_that_would_never_end_is_refused() {
 fn a_map_of_ones_own_leaves_the_mean_colour() {
     let map = ndfmap_core::procedural::find("foil").unwrap().build;
     let map = map(ndfmap_core::grid::Size::new(4, 4).unwrap());
-    let staging = SceneOptions { map: Some(map.into()), ..SceneOptions::default() };
+    let staging = SceneOptions { map: Some(MaterialMap::Surface(map.into())), ..SceneOptions::default() };
     let (scene, warnings) = model_of_bytes(Path::new("a.gltf"), &gltf(), &ModelOptions { staging }).unwrap();
     assert!(warnings[0].contains("left out"), "{warnings:?}");
     let params = scene.materials[0].params;

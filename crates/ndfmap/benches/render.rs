@@ -10,11 +10,12 @@ use std::time::Instant;
 
 use ndfmap_core::grid::Size;
 use ndfmap_core::lookup::{Filtering, Lookups};
-use ndfmap_core::metrics::{color_error, relative_l2};
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::observe::Unobserved;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{self, Effort, Scene, SceneOptions};
+use ndfmap_scene as scene;
+use ndfmap_scene::metrics::{color_error, relative_l2};
+use ndfmap_scene::{Effort, Scene, SceneOptions};
 use ndfmap_trace::Geometry;
 use ndfmap_trace::filtered::{BakedMaps, Filtered};
 use ndfmap_trace::truth::Truth;

@@ -26,6 +26,7 @@ pub use ndfmap_core as core;
 #[cfg(feature = "shaders")]
 pub use ndfmap_gpu as gpu;
 pub use ndfmap_maps as maps;
+pub use ndfmap_scene as scene;
 pub use ndfmap_trace as trace;
 
 mod bake;

@@ -4,19 +4,18 @@ use std::time::Instant;
 
 use ndfmap_core::grid::Size;
 use ndfmap_core::lookup::Lookups;
-use ndfmap_core::metrics::{Picture, change, color_error, relative_l2};
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::observe::Observer;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{Effort, Scene};
+use ndfmap_scene::metrics::{Picture, change, color_error, relative_l2};
+use ndfmap_scene::{Effort, Scene};
 use ndfmap_trace::{DRIFT_FRAMES, drifted};
 use serde::Serialize;
 
-use crate::Error;
-use crate::SceneSpec;
 #[cfg(feature = "gpu")]
 use crate::device::Gpu;
 use crate::device::{Cpu, DeviceReport, Engine, RenderedPicture, TrueGeometry, View};
+use crate::{Error, SceneSpec};
 
 /// What is to be rendered.
 pub struct RenderJob<'a> {

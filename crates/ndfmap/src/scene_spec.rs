@@ -1,7 +1,6 @@
 //! Specification of a scene: built-in or from a file, with its own camera, lights and lobe or others.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use glam::DVec3;
 use ndfmap_core::brdf::{AnyLobe, ShadingModel};
@@ -9,9 +8,9 @@ use ndfmap_core::grid::Size;
 use ndfmap_core::light::Light;
 use ndfmap_core::light::environment::SceneEnvironment;
 use ndfmap_core::observe::Observer;
-use ndfmap_core::scene::{self, Camera, Scene, SceneOptions};
-use ndfmap_core::surface::Surface;
 use ndfmap_maps::model::{ModelOptions, read_model};
+use ndfmap_scene as scene;
+use ndfmap_scene::{Camera, MaterialMap, Scene, SceneOptions};
 
 use crate::Error;
 
@@ -21,7 +20,7 @@ pub struct SceneSpec {
     /// Name of a built-in scene, or a model file.
     pub scene: String,
     /// Map of the first material.
-    pub map: Option<Arc<dyn Surface>>,
+    pub map: Option<MaterialMap>,
     /// Size of built-in maps.
     pub map_size: Option<Size>,
     /// Lobe of every material.

@@ -2,8 +2,8 @@
 
 use glam::{DVec2, DVec3};
 use ndfmap_core::grid::{Grid, Size};
-use ndfmap_core::metrics::Picture;
-use ndfmap_core::scene::Camera;
+use ndfmap_scene::Camera;
+use ndfmap_scene::metrics::Picture;
 
 /// Steps of the drift, each a sixteenth of a pixel to the right and down.
 pub(crate) const STEPS: usize = 16;

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use glam::{DMat2, DMat3, DVec2, DVec3, Mat2, Vec3A};
 use ndfmap_core::grid::Size;
-use ndfmap_core::scene::{Camera, Mesh, Object, Rays, Scene, Vertex};
+use ndfmap_scene::{Camera, Mesh, Object, Rays, Scene, Vertex};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::cwbvh::{CwBvh, builder::build_cwbvh};

@@ -11,14 +11,15 @@ use ndfmap_core::brdf::{AnyLobe, Brdf, Directions, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
 use ndfmap_core::lookup::{Filtering, Lookups};
-use ndfmap_core::metrics::Picture;
 use ndfmap_core::ndf::{AnyMethod, FilteredTexel, IncidentLight, Method};
 use ndfmap_core::observe::Unobserved;
 use ndfmap_core::procedural;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{self, Camera, Effort, Material, Mesh, Object, Scene, SceneOptions};
 use ndfmap_core::surface::{HeightField, SlopeFilter, Surface, Wraps};
 use ndfmap_core::units::SlopeVariance;
+use ndfmap_scene as scene;
+use ndfmap_scene::metrics::Picture;
+use ndfmap_scene::{Camera, Effort, Material, Mesh, Object, Scene, SceneOptions};
 use ndfmap_trace::filtered::{BakedMaps, Filtered};
 use ndfmap_trace::truth::Truth;
 use ndfmap_trace::{DisplacedMeshes, Geometry};
@@ -41,7 +42,7 @@ fn plane(surface: Arc<dyn Surface>, brdf: Brdf, diffuse: f64, directions: &Direc
         objects: vec![Object { mesh: mesh.into(), material: 0 }],
         materials: vec![Material {
             name: "plane".to_owned(),
-            surface,
+            map: surface.into(),
             params: SurfaceParams {
                 diffuse: DVec3::splat(diffuse),
                 specular: DVec3::splat(1.0 - diffuse),
@@ -183,7 +184,7 @@ fn errors(deviations: DVec2, lobe: &str, surfaces: u64, rays: usize) -> [f64; 2]
         let brdf = || Brdf { lobe: lobe.parse::<AnyLobe>().unwrap(), shading: ShadingModel::Masked };
         let mut scene = plane(Arc::new(gaussian(deviations, seed)), brdf(), 0.0, &incident_directions()[0]);
         scene.displace(1.0, false).unwrap();
-        let channels = coarsest(&*scene.materials[0].surface, &*method);
+        let channels = coarsest(&*scene.materials[0].map, &*method);
         let (geometry, displacement) = (Geometry::without_displacement(&scene), DisplacedMeshes::new(&scene));
         for (lobe, pairs) in ["lambert", lobe].into_iter().zip(&mut all) {
             let diffuse = if lobe == "lambert" { 1.0 } else { 0.0 };
@@ -307,7 +308,7 @@ fn builtin_maps_have_the_slopes_that_are_displaced() {
             second.iter_mut().zip(products).for_each(|(sum, p)| *sum += p / f64::from(count));
         }
         let method = "slopes".parse::<AnyMethod>().unwrap();
-        let texel = coarsest(&*scene.materials[0].surface, &*method);
+        let texel = coarsest(&*scene.materials[0].map, &*method);
         let scale = second[0] + second[1];
         // Twenty thousand slopes leave a percent; facets half a texel wide have 1/24 of the texel's own bend
         // less than the surface.

@@ -16,9 +16,9 @@ use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
 use ndfmap_core::light::environment::{Environment, SceneEnvironment, Technique, builtin};
 use ndfmap_core::lookup::Lookups;
-use ndfmap_core::metrics::{Picture, relative_l2};
-use ndfmap_core::scene::Scene;
 use ndfmap_core::surface::{NormalGrid, Surface, SurfaceRow, Wraps};
+use ndfmap_scene::Scene;
+use ndfmap_scene::metrics::{Picture, relative_l2};
 
 fn flat() -> Arc<dyn Surface> {
     Arc::new(NormalGrid { normals: Grid::from_fn(SQUARE, |_, _| Vec3::Z), wraps: Wraps::default() })

@@ -14,13 +14,14 @@ use ndfmap_core::brdf::{Directions, ShadingModel};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
 use ndfmap_core::lookup::{Filtering, Lookups};
-use ndfmap_core::metrics::{Picture, relative_l2};
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::observe::Unobserved;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{self, Camera, Effort, Mesh, Scene, SceneOptions, SurfaceTextures};
 use ndfmap_core::surface::{NormalGrid, Surface, SurfaceRow, Wraps};
 use ndfmap_core::{ndf, procedural};
+use ndfmap_scene as scene;
+use ndfmap_scene::metrics::{Picture, relative_l2};
+use ndfmap_scene::{Camera, Effort, Mesh, Scene, SceneOptions, SurfaceTextures};
 use ndfmap_trace::filtered::{BakedMaps, Filtered};
 use ndfmap_trace::truth::Truth;
 use ndfmap_trace::{DRIFT_FRAMES, Geometry, drifted};
@@ -28,11 +29,11 @@ use ndfmap_trace::{DRIFT_FRAMES, Geometry, drifted};
 /// Mean over all texels of what they reflect, for one way: what a whole map far away looks like.
 fn mean_over_map(scene: &Scene, directions: &Directions) -> DVec3 {
     let material = &scene.materials[0];
-    let size = material.surface.size();
+    let size = material.map.size();
     let mut row = SurfaceRow::flat(size.width);
     let mut sum = DVec3::ZERO;
     for y in 0..size.height {
-        material.surface.read_row(y, &mut row);
+        material.map.read_row(y, &mut row);
         for x in 0..size.width {
             sum += material.brdf.facet(row.normal(x).as_dvec3(), &material.params, directions);
         }

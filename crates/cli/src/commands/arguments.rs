@@ -7,16 +7,15 @@ use ndfmap::core::brdf::{self, AnyLobe, LobeFactors, ParseLobeError, ShadingMode
 use ndfmap::core::grid::Size;
 use ndfmap::core::light::environment::{SceneEnvironment, Technique, builtin};
 use ndfmap::core::ndf::{self, AnyMethod, ParseMethodError};
+use ndfmap::core::pyramid;
 use ndfmap::core::surface::{SlopeFilter, Wrap, Wraps};
-use ndfmap::core::{pyramid, scene};
 use ndfmap::maps::SourceKind;
 use ndfmap::maps::environment::read_environment;
 use ndfmap::maps::merl::read_merl;
 use ndfmap::maps::model::is_model;
 use ndfmap::maps::source::{Convention, DEFAULT_HEIGHT_SCALE, SourceOptions};
+use ndfmap::{Error, RotatingEnvironment, scene};
 use serde_json::json;
-
-use ndfmap::{Error, RotatingEnvironment};
 
 /// How to take the source map.
 #[derive(Debug, Args)]

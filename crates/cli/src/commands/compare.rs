@@ -10,11 +10,11 @@ use ndfmap::core::grid::Size;
 use ndfmap::core::lookup::Lookups;
 use ndfmap::core::ndf::AnyMethod;
 use ndfmap::core::pyramid;
-use ndfmap::core::scene::Effort;
 use ndfmap::maps::source::{SourceMap, read_source};
 use ndfmap::maps::{MapError, atomic};
 use ndfmap::render::{Device, RenderJob, RenderReport, render};
 use ndfmap::report::{self, Pages, ReportFile};
+use ndfmap::scene::Effort;
 use ndfmap::{Error, SceneSpec};
 
 use super::arguments::{
@@ -104,7 +104,7 @@ impl Compare {
             pictures: self.scene.as_ref().map(|scene| Pictures {
                 scene: SceneSpec {
                     scene: scene.clone(),
-                    map: Some(Arc::clone(&map.surface)),
+                    map: Some(Arc::clone(&map.surface).into()),
                     lobe: Some(brdf.clone()),
                     displacement: self.displace.displacement(),
                     environment: environment.clone(),

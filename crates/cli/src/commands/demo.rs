@@ -8,11 +8,11 @@ use ndfmap::core::grid::Size;
 use ndfmap::core::lookup::{Filtering, Lookups};
 use ndfmap::core::ndf::{AnyMethod, Slopes};
 use ndfmap::core::pyramid::Precision;
-use ndfmap::core::scene::Effort;
 use ndfmap::maps::source::{SourceOptions, read_source};
 use ndfmap::maps::{WriteOptions, atomic};
 use ndfmap::render::{Device, RenderJob, render};
 use ndfmap::report::contact_sheet;
+use ndfmap::scene::Effort;
 use ndfmap::{BakeJob, Error, SceneSpec};
 
 use super::arguments::read_brdf;

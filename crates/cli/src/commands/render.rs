@@ -1,7 +1,6 @@
 //! `ndfmap render`: pictures of a scene, through baked maps and by brute force, and how far they are apart.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
@@ -11,16 +10,15 @@ use ndfmap::core::grid::{Grid, Size};
 use ndfmap::core::light::Light;
 use ndfmap::core::lookup::{Filtering, Lookups, Sampling};
 use ndfmap::core::ndf::AnyMethod;
-use ndfmap::core::scene::{self, BakedSurface, Effort};
-use ndfmap::core::surface::Surface;
-use ndfmap::core::tone::Tone;
 use ndfmap::maps::atomic;
 use ndfmap::maps::formats::{read_file, read_ndf};
 use ndfmap::maps::picture::{PictureFormat, write_picture};
 use ndfmap::maps::source::{BUILTIN_PREFIX, read_source};
 use ndfmap::render::{self, Frame, RenderJob, RenderReport};
 use ndfmap::report::{SheetPlan, contact_sheet};
-use ndfmap::{CameraSpec, DisplacementOptions, Error, SceneSpec};
+use ndfmap::scene::tone::Tone;
+use ndfmap::scene::{BakedSurface, Effort};
+use ndfmap::{CameraSpec, DisplacementOptions, Error, SceneSpec, scene};
 use serde_json::{Map, Value, json};
 
 use super::arguments::{
@@ -444,12 +442,12 @@ impl Render {
 
     fn scene_spec(&self, baked: Option<BakedSurface>) -> Result<SceneSpec, Error> {
         let map = match (baked, &self.map) {
-            (Some(baked), _) => Some(Arc::new(baked) as Arc<dyn Surface>),
+            (Some(baked), _) => Some(baked.into()),
             (None, Some(path)) => {
                 let size = self.map_size.unwrap_or(Size { width: 512, height: 512 });
                 let map = read_source(path, &self.source.options(size))?;
                 map.warnings.iter().for_each(|w| warn(path, w));
-                Some(map.surface)
+                Some(map.surface.into())
             }
             (None, None) => None,
         };

@@ -16,9 +16,9 @@ use glam::{DVec3, Mat3, Mat4, Vec2, Vec3, Vec4};
 use ndfmap_core::brdf::SurfaceParams;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::lookup::area_mean;
-use ndfmap_core::scene::{Material, SurfaceTextures};
 use ndfmap_core::surface::{Surface, SurfaceRow, Wrap, Wraps, unit_or_up};
 use ndfmap_core::units::{Alpha, PerceptualRoughness, SlopeVariance};
+use ndfmap_scene::{Material, SurfaceTextures};
 
 use super::{MAX_ELEMENTS, ModelFormat, Parts, RawMesh, flat, microfacets};
 use crate::attribute::{Transfer, attribute_of_image};
@@ -231,7 +231,7 @@ impl Files<'_> {
             let params = SurfaceParams { roughness: SlopeVariance::ZERO, ..params };
             return Ok(Material {
                 name,
-                surface,
+                map: surface.into(),
                 params,
                 textures: None,
                 displacement: None,
@@ -255,7 +255,14 @@ impl Files<'_> {
             specular: Some(specular.into()),
         });
         // The lobe itself is as sharp as can be; all its width is in the map.
-        Ok(Material { name, surface, params, textures, displacement: None, brdf: microfacets(0.0) })
+        Ok(Material {
+            name,
+            map: surface.into(),
+            params,
+            textures,
+            displacement: None,
+            brdf: microfacets(0.0),
+        })
     }
 }
 

@@ -17,9 +17,9 @@ use glam::{DVec3, Vec2, Vec3, Vec4};
 use ndfmap_core::brdf::{Brdf, Ggx, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
-use ndfmap_core::scene::{Camera, Material, Mesh, Object, Scene, SceneOptions, Vertex, area_normals};
 use ndfmap_core::surface::{NormalGrid, Surface, Wraps};
 use ndfmap_core::units::{Alpha, SlopeVariance};
+use ndfmap_scene::{Camera, Material, Mesh, Object, Scene, SceneOptions, Vertex, area_normals};
 
 use crate::MapError;
 use crate::formats::read_file;
@@ -132,7 +132,7 @@ fn scene_of(
         };
     }
     if let Some(map) = &options.staging.map {
-        parts.materials[0].surface = Arc::clone(map);
+        parts.materials[0].map = map.clone();
         if parts.materials[0].textures.take().is_some() {
             warnings.push(
                 "its first material's textures go with its own normal map, and are left out".to_owned(),
@@ -174,7 +174,7 @@ fn flat(size: Size) -> Arc<dyn Surface> {
 fn plain() -> Material {
     Material {
         name: "plain".to_owned(),
-        surface: flat(Size { width: 1, height: 1 }),
+        map: flat(Size { width: 1, height: 1 }).into(),
         params: SurfaceParams {
             diffuse: DVec3::splat(0.3),
             specular: DVec3::splat(0.12),

@@ -7,7 +7,7 @@ use ndfmap_core::lookup::Lookups;
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::observe::Observer;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{Effort, Material, Scene, TruePicture};
+use ndfmap_scene::{Effort, Material, Scene, TruePicture};
 use ndfmap_trace::Geometry;
 use ndfmap_trace::filtered::{BakedMaps, Filtered};
 use ndfmap_trace::truth::Truth;

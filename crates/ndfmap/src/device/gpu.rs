@@ -5,10 +5,10 @@ use ndfmap_core::lookup::{Lookups, Sampling};
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::observe::Observer;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{Effort, Material, Scene, TruePicture};
 use ndfmap_gpu::{
     Antialiasing, Canvas, Device, FinestMaps, Frame, Geometry, Maps, Meshes, Renderer, SceneView, TrueFrame,
 };
+use ndfmap_scene::{Effort, Material, Scene, TruePicture};
 
 use super::{DeviceReport, Engine, RenderedPicture, TrueGeometry, View};
 use crate::Error;

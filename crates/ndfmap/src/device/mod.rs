@@ -10,11 +10,11 @@ pub(crate) use gpu::Gpu;
 
 use ndfmap_core::grid::Size;
 use ndfmap_core::lookup::Lookups;
-use ndfmap_core::metrics::Picture;
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::observe::Observer;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{Camera, Effort, Material, Scene, TruePicture};
+use ndfmap_scene::metrics::Picture;
+use ndfmap_scene::{Camera, Effort, Material, Scene, TruePicture};
 use ndfmap_trace::truth::Truth;
 use ndfmap_trace::{DisplacedMeshes, Geometry};
 use serde::Serialize;

@@ -3,8 +3,8 @@
 use glam::DVec3;
 use ndfmap_core::grid::Size;
 use ndfmap_core::measure::TexelTruth;
-use ndfmap_core::metrics::display_value;
 use ndfmap_core::sphere::DiskLattice;
+use ndfmap_scene::metrics::display_value;
 use rayon::prelude::*;
 
 use super::canvas::{Canvas, LETTER, LINE};

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use glam::{DVec2, DVec3};
-use ndfmap_core::scene::{Displacement as Heights, Mesh, Scene, Vertex};
+use ndfmap_scene::{Displacement as Heights, Mesh, Scene, Vertex};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::cwbvh::{CwBvh, builder::build_cwbvh};

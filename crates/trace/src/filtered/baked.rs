@@ -7,7 +7,7 @@ use ndfmap_core::ndf::{
 };
 use ndfmap_core::observe::{Cancelled, Observer};
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{BakedMaterial, Material, SurfaceTextures};
+use ndfmap_scene::{BakedMaterial, Material, SurfaceTextures};
 
 /// What a bake makes of one material. Lights, BRDFs and models come in when shading.
 pub(super) struct Baked {
@@ -40,7 +40,7 @@ impl Baked {
         observer: &dyn Observer,
     ) -> Result<Self, Cancelled> {
         let baked = BakedMaterial::new(material, &**method, precision, observer)?;
-        let wraps = material.surface.wraps();
+        let wraps = material.map.wraps();
         Ok(Self {
             map: Lookup::new(&baked.pyramid),
             layers: method.layers(),

@@ -14,11 +14,11 @@ use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::environment::SceneEnvironment;
 use ndfmap_core::light::{Light, SplitSum};
 use ndfmap_core::lookup::{Lookups, PixelFootprint};
-use ndfmap_core::metrics::Picture;
 use ndfmap_core::ndf::{AnyMethod, IncidentLight, LocalEnvironment, PreparedBrdf};
 use ndfmap_core::observe::{Cancelled, Forward, Observer};
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{Camera, Material, Rays, Scene};
+use ndfmap_scene::metrics::Picture;
+use ndfmap_scene::{Camera, Material, Rays, Scene};
 use rayon::prelude::*;
 
 use self::baked::{Baked, Shading};

@@ -14,10 +14,10 @@ use glam::{DMat3, DVec2, DVec3, Vec3};
 use ndfmap_core::brdf::{Directions, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::Light;
-use ndfmap_core::metrics::{Picture, relative_l2};
 use ndfmap_core::observe::{Cancelled, Forward, Observer};
-use ndfmap_core::scene::{Camera, Effort, Material, Rays, Scene, TruePicture};
 use ndfmap_core::surface::{SurfaceRow, Wraps, normal_of_slope, slope_of_normal};
+use ndfmap_scene::metrics::{Picture, relative_l2};
+use ndfmap_scene::{Camera, Effort, Material, Rays, Scene, TruePicture};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
@@ -73,7 +73,7 @@ impl<'a> Truth<'a> {
     #[must_use]
     pub fn new(scene: &'a Scene, geometry: &'a Geometry) -> Self {
         let finest = |material: &'a Material| {
-            let surface = &*material.surface;
+            let surface = &*material.map;
             let mut row = SurfaceRow::flat(surface.size().width);
             let normals = Grid::from_fn(surface.size(), |x, y| {
                 if x == 0 {

@@ -9,14 +9,14 @@ use ndfmap_core::brdf::{AnyLobe, Brdf, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::Size;
 use ndfmap_core::light::Light;
 use ndfmap_core::lookup::Lookups;
-use ndfmap_core::metrics::Picture;
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::observe::Unobserved;
 use ndfmap_core::procedural;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_core::scene::{Camera, Effort, Material, Mesh, Object, Scene, TruePicture};
 use ndfmap_core::surface::Surface;
 use ndfmap_core::units::SlopeVariance;
+use ndfmap_scene::metrics::Picture;
+use ndfmap_scene::{Camera, Effort, Material, Mesh, Object, Scene, TruePicture};
 use ndfmap_trace::Geometry;
 use ndfmap_trace::filtered::{BakedMaps, Filtered};
 use ndfmap_trace::truth::Truth;
@@ -37,7 +37,7 @@ pub(crate) fn plate(surface: Arc<dyn Surface>, lobe: &str, shading: ShadingModel
         objects: vec![Object { mesh: mesh.into(), material: 0 }],
         materials: vec![Material {
             name: "plate".to_owned(),
-            surface,
+            map: surface.into(),
             params: SurfaceParams {
                 diffuse: DVec3::new(0.4, 0.3, 0.2),
                 specular: DVec3::splat(0.1),

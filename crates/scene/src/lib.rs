@@ -1,4 +1,5 @@
-//! Scenes as data: a camera, meshes with materials, lights. And the table of built-in ones.
+//! ndfmap-scene: scenes as data: a camera, meshes with materials, lights; the table of built-in ones; and how
+//! far pictures of them are apart ([`metrics`]).
 //!
 //! World: right-handed, y up, no unit. A scene that moves is a function of time, 0 to 1; nothing else is kept
 //! between frames. [`TABLE`] has one row for each built-in scene, and a row buys the tests at the end of this
@@ -15,10 +16,12 @@ mod displacement;
 mod foil;
 mod material;
 mod mesh;
+pub mod metrics;
 mod noise_sphere;
 mod plane;
 mod sphere;
 pub mod tessellation;
+pub mod tone;
 mod truth;
 mod v_groove;
 
@@ -26,20 +29,19 @@ pub use self::truth::{Effort, TruePicture};
 pub use baked::{BakedMaterial, BakedSurface};
 pub use camera::{Camera, Rays};
 pub use displacement::Displacement;
-pub use material::{Material, SurfaceTextures};
+pub use material::{Material, MaterialMap, SurfaceTextures};
 pub use mesh::{Mesh, Vertex, area_normals};
 
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use crate::brdf::{self, AnyLobe, Argument, Brdf, Lobe, ShadingModel, SurfaceParams};
-use crate::grid::Size;
-use crate::light::Light;
-use crate::light::environment::SceneEnvironment;
-use crate::procedural;
-use crate::surface::Surface;
-use crate::units::SlopeVariance;
+use ndfmap_core::brdf::{self, AnyLobe, Argument, Brdf, Lobe, ShadingModel, SurfaceParams};
+use ndfmap_core::grid::Size;
+use ndfmap_core::light::Light;
+use ndfmap_core::light::environment::SceneEnvironment;
+use ndfmap_core::procedural;
+use ndfmap_core::units::SlopeVariance;
 
 /// A mesh of one material.
 #[derive(Clone, Debug)]
@@ -77,7 +79,7 @@ pub struct SceneOptions {
     /// Size of built-in maps.
     pub map_size: Size,
     /// A map for the scene's first material, in place of its own.
-    pub map: Option<Arc<dyn Surface>>,
+    pub map: Option<MaterialMap>,
 }
 
 impl Default for SceneOptions {
@@ -88,14 +90,14 @@ impl Default for SceneOptions {
 
 impl SceneOptions {
     /// The map of the first material: the one given, or a built-in one.
-    fn first_map(&self, own: &str) -> Arc<dyn Surface> {
+    fn first_map(&self, own: &str) -> MaterialMap {
         self.map.clone().unwrap_or_else(|| self.builtin(own))
     }
 
     /// A built-in map.
-    fn builtin(&self, name: &str) -> Arc<dyn Surface> {
+    fn builtin(&self, name: &str) -> MaterialMap {
         let row = procedural::find(name).unwrap_or_else(|| unreachable!("{name} is a row of the table"));
-        Arc::from((row.build)(self.map_size))
+        MaterialMap::Surface(Arc::from((row.build)(self.map_size)))
     }
 }
 
@@ -168,18 +170,18 @@ impl Scene {
     pub fn displace(&mut self, scale: f64, shadows: bool) -> Result<(), NoHeights> {
         let mut any = false;
         for (index, material) in self.materials.iter_mut().enumerate() {
-            if !material.surface.has_height() {
+            if !material.map.has_height() {
                 continue;
             }
             any = true;
-            if let Some(exact) = material.surface.with_exact_slopes() {
-                material.surface = exact;
+            if let Some(exact) = material.map.with_exact_slopes() {
+                material.map = exact.into();
             }
-            let Size { width, height } = material.surface.size();
+            let Size { width, height } = material.map.size();
             let on = |o: &&mut Object| o.material == index;
             let meshes = self.objects.iter().filter(|o| o.material == index).map(|o| &*o.mesh);
             let width = displacement::texture_width(meshes, height as f64 / width as f64);
-            let displacement = Displacement::new(&*material.surface, width, scale);
+            let displacement = Displacement::new(&*material.map, width, scale);
             for object in self.objects.iter_mut().filter(on) {
                 object.mesh = object.mesh.with_displacement(&displacement).into();
             }

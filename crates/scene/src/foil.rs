@@ -3,8 +3,8 @@
 use glam::{DVec2, DVec3, Vec3};
 
 use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, brdf, sun, zoom};
-use crate::brdf::{ShadingModel, SurfaceParams};
-use crate::units::SlopeVariance;
+use ndfmap_core::brdf::{ShadingModel, SurfaceParams};
+use ndfmap_core::units::SlopeVariance;
 
 pub(super) const ROW: Row = Row {
     name: "foil",
@@ -21,7 +21,7 @@ pub(super) const ROW: Row = Row {
             objects: vec![Object { mesh: mesh.into(), material: 0 }],
             materials: vec![Material {
                 name: "foil".to_owned(),
-                surface: staging.first_map("foil"),
+                map: staging.first_map("foil"),
                 params: SurfaceParams {
                     diffuse: DVec3::splat(0.06),
                     specular: DVec3::new(0.6, 0.6, 0.62),

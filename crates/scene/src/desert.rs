@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3, Vec3};
 
 use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, brdf, sun, zoom};
-use crate::brdf::{ShadingModel, SurfaceParams};
-use crate::units::SlopeVariance;
+use ndfmap_core::brdf::{ShadingModel, SurfaceParams};
+use ndfmap_core::units::SlopeVariance;
 
 /// Side of the terrain.
 const SIDE: f64 = 40.0;
@@ -40,7 +40,7 @@ pub(super) const ROW: Row = Row {
             objects: vec![Object { mesh: mesh.into(), material: 0 }],
             materials: vec![Material {
                 name: "sand".to_owned(),
-                surface: staging.first_map("dunes"),
+                map: staging.first_map("dunes"),
                 params: SurfaceParams {
                     diffuse: DVec3::new(0.75, 0.5, 0.27),
                     specular: DVec3::splat(0.04),

@@ -4,8 +4,8 @@
 use glam::{DVec2, DVec3, Vec3};
 
 use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, brdf, sun};
-use crate::brdf::{ShadingModel, SurfaceParams};
-use crate::units::SlopeVariance;
+use ndfmap_core::brdf::{ShadingModel, SurfaceParams};
+use ndfmap_core::units::SlopeVariance;
 
 pub(super) const ROW: Row = Row {
     name: "v-groove",
@@ -18,7 +18,7 @@ pub(super) const ROW: Row = Row {
             objects: vec![Object { mesh: mesh.into(), material: 0 }],
             materials: vec![Material {
                 name: "grooves".to_owned(),
-                surface: staging.first_map("v-groove"),
+                map: staging.first_map("v-groove"),
                 params: SurfaceParams {
                     diffuse: DVec3::splat(0.1),
                     specular: DVec3::splat(0.2),

@@ -13,7 +13,10 @@ use glam::{DVec2, DVec3, Mat2, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::{Displacement, Mesh, Rays, Vertex};
-use crate::grid::Size;
+use ndfmap_core::grid::Size;
+
+/// Twin of this file in WGSL.
+pub const TESSELLATION: &str = include_str!("tessellation.wgsl");
 
 /// Longest edge of a triangle, in pixels. Rounding to powers of two makes most of them half to all of that:
 /// with a right angle, triangles of two to eight pixels.
@@ -279,7 +282,7 @@ pub(super) fn split(mesh: &Mesh) -> Mesh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{self, Camera, SceneOptions};
+    use crate::{Camera, SceneOptions};
     use std::collections::HashMap;
 
     #[test]
@@ -312,7 +315,7 @@ mod tests {
     #[test]
     fn there_are_no_cracks() {
         let staging = SceneOptions::default();
-        let mut scene = (scene::find("sphere").unwrap().build)(&staging);
+        let mut scene = (crate::find("sphere").unwrap().build)(&staging);
         scene.displace(1.0, false).unwrap();
         let size = Size { width: 1000, height: 1000 };
         // Near one side, so that patches differ as much as they can; all of it in view.
@@ -349,7 +352,7 @@ mod tests {
         let count = |map: usize, time: f64| {
             let staging =
                 SceneOptions { time, map_size: Size { width: map, height: map }, ..SceneOptions::default() };
-            let mut scene = (scene::find("armour").unwrap().build)(&staging);
+            let mut scene = (crate::find("armour").unwrap().build)(&staging);
             scene.displace(1.0, false).unwrap();
             let displacement = scene.materials[0].displacement.as_ref().unwrap();
             plan(&scene.objects[0].mesh, displacement, &scene.camera.rays(size), size).triangles

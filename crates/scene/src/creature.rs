@@ -6,8 +6,8 @@ use glam::{DVec2, DVec3, Vec3};
 use super::desert::rolling;
 use super::sphere::ball;
 use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, brdf, sun};
-use crate::brdf::{ShadingModel, SurfaceParams};
-use crate::units::SlopeVariance;
+use ndfmap_core::brdf::{ShadingModel, SurfaceParams};
+use ndfmap_core::units::SlopeVariance;
 
 /// Catmull-Rom through `points`, at t from 0 to 1.
 fn spline(points: &[(DVec3, f64)], t: f64) -> (DVec3, f64) {
@@ -108,9 +108,9 @@ pub(super) const ROW: Row = Row {
     summary: "a horned lizard on sand, four materials",
     animation: "its wet skin dries: the highlights widen and fade",
     build: |staging: &SceneOptions| {
-        let material = |name: &str, surface, params, lobe: &str| Material {
+        let material = |name: &str, map, params, lobe: &str| Material {
             name: name.to_owned(),
-            surface,
+            map,
             params,
             textures: None,
             displacement: None,

@@ -11,10 +11,10 @@ use glam::{DVec2, DVec3, Vec3};
 
 use super::sphere::ball;
 use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, brdf, sun, zoom};
-use crate::brdf::{ShadingModel, SurfaceParams};
-use crate::grid::Size;
-use crate::procedural::{Grain, sphere_noise};
-use crate::units::SlopeVariance;
+use ndfmap_core::brdf::{ShadingModel, SurfaceParams};
+use ndfmap_core::grid::Size;
+use ndfmap_core::procedural::{Grain, sphere_noise};
+use ndfmap_core::units::SlopeVariance;
 
 /// Deviation of the slopes, displaced at scale 1.
 const DEVIATION: f64 = 0.25;
@@ -36,7 +36,7 @@ fn build(staging: &SceneOptions, grain: Grain) -> Scene {
         objects: vec![Object { mesh: mesh.into(), material: 0 }],
         materials: vec![Material {
             name: "noise".to_owned(),
-            surface: staging.map.clone().unwrap_or_else(|| own()),
+            map: staging.map.clone().unwrap_or_else(|| crate::MaterialMap::Surface(own())),
             params: SurfaceParams {
                 diffuse: DVec3::splat(0.75),
                 specular: DVec3::splat(0.04),

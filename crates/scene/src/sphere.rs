@@ -5,8 +5,8 @@ use std::f64::consts::{PI, TAU};
 use glam::{DVec2, DVec3, Vec3};
 
 use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, brdf, sun, zoom};
-use crate::brdf::{ShadingModel, SurfaceParams};
-use crate::units::SlopeVariance;
+use ndfmap_core::brdf::{ShadingModel, SurfaceParams};
+use ndfmap_core::units::SlopeVariance;
 
 /// A ball of radius 1, its map once around and half as often from pole to pole.
 pub(super) fn ball(s: f64, t: f64) -> DVec3 {
@@ -26,7 +26,7 @@ pub(super) const ROW: Row = Row {
             objects: vec![Object { mesh: mesh.into(), material: 0 }],
             materials: vec![Material {
                 name: "ball".to_owned(),
-                surface: staging.first_map("ripples"),
+                map: staging.first_map("ripples"),
                 params: SurfaceParams {
                     diffuse: DVec3::new(0.25, 0.05, 0.04),
                     specular: DVec3::splat(0.15),

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3, Vec3};
 
 use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, brdf, sun, zoom};
-use crate::brdf::{ShadingModel, SurfaceParams};
-use crate::units::SlopeVariance;
+use ndfmap_core::brdf::{ShadingModel, SurfaceParams};
+use ndfmap_core::units::SlopeVariance;
 
 /// A torso: height and radii of its cross-section at t from 0 (hip) to 1 (neck).
 fn torso(s: f64, t: f64) -> DVec3 {
@@ -39,7 +39,7 @@ pub(super) const ROW: Row = Row {
             objects: vec![Object { mesh: mesh.into(), material: 0 }],
             materials: vec![Material {
                 name: "gold".to_owned(),
-                surface: staging.first_map("armour"),
+                map: staging.first_map("armour"),
                 params: SurfaceParams {
                     diffuse: DVec3::new(0.25, 0.17, 0.05),
                     specular: DVec3::new(0.2, 0.145, 0.055),

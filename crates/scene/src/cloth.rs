@@ -10,8 +10,8 @@ use glam::{DVec2, DVec3, Vec3};
 use super::mesh::grid_triangles;
 use super::sphere::ball;
 use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, Vertex, brdf, sun};
-use crate::brdf::{ShadingModel, SurfaceParams};
-use crate::units::SlopeVariance;
+use ndfmap_core::brdf::{ShadingModel, SurfaceParams};
+use ndfmap_core::units::SlopeVariance;
 
 /// Cells on a side.
 const CELLS: usize = 56;
@@ -119,9 +119,9 @@ pub(super) const ROW: Row = Row {
             specular: DVec3::splat(specular),
             roughness: SlopeVariance::ZERO,
         };
-        let material = |name: &str, surface, params, lobe| Material {
+        let material = |name: &str, map, params, lobe| Material {
             name: name.to_owned(),
-            surface,
+            map,
             params,
             textures: None,
             displacement: None,

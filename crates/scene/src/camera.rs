@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::grid::Size;
+use ndfmap_core::grid::Size;
 
 /// A pinhole camera.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,14 +1,19 @@
 //! Materials: a normal or height map, what lies under it, and how it reflects.
 
+use std::ops::Deref;
 use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::Displacement;
-use crate::brdf::{Brdf, SurfaceParams};
-use crate::grid::Grid;
-use crate::surface::Surface;
-use crate::units::SlopeVariance;
+use ndfmap_core::brdf::{Brdf, SurfaceParams};
+use ndfmap_core::grid::Grid;
+use ndfmap_core::ndf::Method;
+use ndfmap_core::pyramid::Pyramid;
+use ndfmap_core::surface::Surface;
+
+use crate::BakedSurface;
+use ndfmap_core::units::SlopeVariance;
 
 /// A [`SurfaceParams`] for each texel.
 #[derive(Clone, Debug)]
@@ -68,12 +73,55 @@ impl SurfaceTextures {
     }
 }
 
+/// Map of a material; to be looked at as the surface that it is.
+#[derive(Clone)]
+pub enum MaterialMap {
+    /// A surface, baked by every method that draws it.
+    Surface(Arc<dyn Surface>),
+    /// A map that was baked before, drawn as it is by methods that read it.
+    Baked(Arc<BakedSurface>),
+}
+
+impl MaterialMap {
+    /// The stored map as a method reads it, where it was baked before and the method reads it.
+    #[must_use]
+    pub fn baked(&self, method: &dyn Method) -> Option<Pyramid> {
+        match self {
+            Self::Surface(_) => None,
+            Self::Baked(map) => map.read_by(method),
+        }
+    }
+}
+
+impl Deref for MaterialMap {
+    type Target = dyn Surface;
+
+    fn deref(&self) -> &Self::Target {
+        match self {
+            Self::Surface(surface) => &**surface,
+            Self::Baked(map) => &**map,
+        }
+    }
+}
+
+impl From<Arc<dyn Surface>> for MaterialMap {
+    fn from(surface: Arc<dyn Surface>) -> Self {
+        Self::Surface(surface)
+    }
+}
+
+impl From<BakedSurface> for MaterialMap {
+    fn from(map: BakedSurface) -> Self {
+        Self::Baked(Arc::new(map))
+    }
+}
+
 /// What an object is made of.
 pub struct Material {
     /// What it is called.
     pub name: String,
     /// Its normals and heights.
-    pub surface: Arc<dyn Surface>,
+    pub map: MaterialMap,
     /// What is the same everywhere; `textures`, where there is one, is in its place.
     pub params: SurfaceParams,
     /// Colours and roughness of each texel, of the surface's size.

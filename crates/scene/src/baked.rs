@@ -3,13 +3,13 @@
 
 use glam::DVec3;
 
-use crate::bake::Bake;
-use crate::fit::Rgba;
-use crate::grid::{Grid, Size};
-use crate::ndf::{AnyMethod, Decoded, Method};
-use crate::observe::{Cancelled, Observer};
-use crate::pyramid::{Precision, Pyramid};
-use crate::surface::{Surface, SurfaceRow, Wraps};
+use ndfmap_core::bake::Bake;
+use ndfmap_core::fit::Rgba;
+use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::ndf::{AnyMethod, Decoded, Method};
+use ndfmap_core::observe::{Cancelled, Observer};
+use ndfmap_core::pyramid::{Precision, Pyramid};
+use ndfmap_core::surface::{Surface, SurfaceRow, Wraps};
 
 use super::Material;
 
@@ -35,10 +35,10 @@ impl BakedMaterial {
         observer: &dyn Observer,
     ) -> Result<Self, Cancelled> {
         let maps = material.textures.as_ref().map_or_else(Vec::new, |map| map.grids());
-        if let Some(pyramid) = material.surface.baked(method) {
+        if let Some(pyramid) = material.map.baked(method) {
             return Ok(Self { pyramid, attributes: 0, params: maps });
         }
-        let bake = Bake::new(&*material.surface, method).precision(precision).observer(observer);
+        let bake = Bake::new(&*material.map, method).precision(precision).observer(observer);
         if method.carries_attributes() {
             let (pyramid, _) = bake.attributes(&maps).to_pyramid()?;
             return Ok(Self { pyramid, attributes: maps.len(), params: Vec::new() });
@@ -54,6 +54,16 @@ pub struct BakedSurface {
     pub method: AnyMethod,
     /// The map.
     pub pyramid: Pyramid,
+}
+
+impl BakedSurface {
+    /// The stored map for a method that reads its channels, or the first of them, and would have fitted the
+    /// same lobes.
+    #[must_use]
+    pub fn read_by(&self, method: &dyn Method) -> Option<Pyramid> {
+        let same = method.reads(&self.method.encoding()) && method.fit() == self.method.fit();
+        same.then(|| self.pyramid.first_layers(method.layers()))
+    }
 }
 
 impl Surface for BakedSurface {
@@ -89,11 +99,5 @@ impl Surface for BakedSurface {
             self.read_row(y, &mut row);
             row.height.iter().any(|h| *h != 0.0)
         })
-    }
-
-    /// For methods that read its channels, or the first of them, and would have fitted the same lobes.
-    fn baked(&self, method: &dyn Method) -> Option<Pyramid> {
-        let same = method.reads(&self.method.encoding()) && method.fit() == self.method.fit();
-        same.then(|| self.pyramid.first_layers(method.layers()))
     }
 }

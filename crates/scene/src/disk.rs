@@ -6,8 +6,8 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use glam::{DVec2, DVec3, Vec3};
 
 use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, brdf, sun, zoom};
-use crate::brdf::{ShadingModel, SurfaceParams};
-use crate::units::SlopeVariance;
+use ndfmap_core::brdf::{ShadingModel, SurfaceParams};
+use ndfmap_core::units::SlopeVariance;
 
 /// The square's concentric rings as circles, without thin triangles in the middle (Shirley and Chiu 1997).
 fn on_disk(x: f64, y: f64) -> DVec3 {
@@ -32,7 +32,7 @@ fn scene(staging: &SceneOptions, camera: Camera) -> Scene {
         objects: vec![Object { mesh: mesh.into(), material: 0 }],
         materials: vec![Material {
             name: "silver".to_owned(),
-            surface: staging.first_map("carved-disk"),
+            map: staging.first_map("carved-disk"),
             params: SurfaceParams {
                 diffuse: DVec3::splat(0.12),
                 specular: DVec3::new(0.16, 0.158, 0.15),

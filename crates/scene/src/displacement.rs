@@ -13,9 +13,9 @@ use glam::{DMat2, DVec2, Mat2, Vec3};
 
 use super::Mesh;
 use super::tessellation::split;
-use crate::grid::{Grid, Size};
-use crate::lookup::{Lookup, Neighbour, Tap, Texels};
-use crate::surface::{Surface, SurfaceRow};
+use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::lookup::{Lookup, Neighbour, Tap, Texels};
+use ndfmap_core::surface::{Surface, SurfaceRow};
 
 /// Heights of a map, and how far they stand out.
 #[derive(Clone, Debug)]

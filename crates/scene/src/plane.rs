@@ -3,8 +3,8 @@
 use glam::{DVec2, DVec3, Vec3};
 
 use super::{Camera, Material, Mesh, Object, Row, Scene, SceneOptions, brdf, sun};
-use crate::brdf::{ShadingModel, SurfaceParams};
-use crate::units::SlopeVariance;
+use ndfmap_core::brdf::{ShadingModel, SurfaceParams};
+use ndfmap_core::units::SlopeVariance;
 
 /// Half of the plane's side; the map covers two by two.
 const HALF: f64 = 60.0;
@@ -18,7 +18,7 @@ fn build(staging: &SceneOptions) -> Scene {
         objects: vec![Object { mesh: mesh.into(), material: 0 }],
         materials: vec![Material {
             name: "plane".to_owned(),
-            surface: staging.first_map("foil"),
+            map: staging.first_map("foil"),
             params: SurfaceParams {
                 diffuse: DVec3::new(0.2, 0.25, 0.32),
                 specular: DVec3::splat(0.06),

@@ -5,7 +5,7 @@
 
 use glam::Vec3;
 
-use crate::grid::Grid;
+use ndfmap_core::grid::Grid;
 
 /// A picture in linear RGB.
 pub type Picture = Grid<Vec3>;
@@ -72,7 +72,7 @@ fn pairs<'a>(a: &'a Picture, b: &'a Picture) -> impl Iterator<Item = (Vec3, Vec3
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::Size;
+    use ndfmap_core::grid::Size;
 
     fn flat(value: f32) -> Picture {
         Grid::from_fn(Size { width: 3, height: 2 }, |_, _| Vec3::splat(value))
