@@ -281,6 +281,27 @@ pub trait Texels {
     }
 }
 
+impl Texels for Pyramid {
+    fn sizes(&self) -> &[Size] {
+        Self::sizes(self)
+    }
+
+    fn wraps(&self) -> Wraps {
+        Self::wraps(self)
+    }
+
+    fn channels(&self) -> usize {
+        4 * self.layers()
+    }
+
+    fn add(&self, place: Neighbour, sums: &mut [f32]) {
+        let weight = place.weight as f32;
+        for (sum, c) in sums.iter_mut().zip(self.texel(place.level, place.x, place.y)) {
+            *sum += weight * c;
+        }
+    }
+}
+
 /// A pyramid in floats, all channels of a texel side by side.
 #[derive(Clone, Debug)]
 pub struct Lookup {

@@ -11,7 +11,6 @@ use half::f16;
 use half::slice::HalfFloatSliceExt;
 
 use crate::grid::Size;
-use crate::lookup::{Neighbour, Texels};
 use crate::surface::Wraps;
 
 /// Sizes of all levels, finest first, down to 1 × 1.
@@ -240,27 +239,6 @@ impl Pyramid {
             self.precision.unpack(&self.levels[level][start..start + texel_bytes], &mut channels);
         }
         channels
-    }
-}
-
-impl Texels for Pyramid {
-    fn sizes(&self) -> &[Size] {
-        &self.sizes
-    }
-
-    fn wraps(&self) -> Wraps {
-        self.wraps
-    }
-
-    fn channels(&self) -> usize {
-        4 * self.layers
-    }
-
-    fn add(&self, place: Neighbour, sums: &mut [f32]) {
-        let weight = place.weight as f32;
-        for (sum, c) in sums.iter_mut().zip(self.texel(place.level, place.x, place.y)) {
-            *sum += weight * c;
-        }
     }
 }
 

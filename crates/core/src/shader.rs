@@ -150,7 +150,7 @@ impl Constant for f32 {
     const SUFFIX: &str = "f";
 }
 
-/// What every shader has: [`crate::brdf`], [`crate::brdf`], [`crate::ndf`] in common.
+/// What every shader has: what [`crate::brdf`] and [`crate::ndf`] have in common.
 const SHARED: [&str; 4] = [
     include_str!("brdf/shading.wgsl"),
     include_str!("brdf/lambert.wgsl"),
