@@ -11,6 +11,7 @@ mod jpeg;
 pub mod ktx2;
 mod png;
 mod tga;
+#[cfg(feature = "tiff")]
 mod tiff;
 
 use std::path::Path;
@@ -96,9 +97,17 @@ impl Format {
     };
 }
 
-/// Every format there is.
-pub static TABLE: &[Format] =
-    &[png::FORMAT, jpeg::FORMAT, tiff::FORMAT, exr::FORMAT, hdr::FORMAT, ktx2::FORMAT, tga::FORMAT];
+/// Every format there is, of those that the crate was built with.
+pub static TABLE: &[Format] = &[
+    png::FORMAT,
+    jpeg::FORMAT,
+    #[cfg(feature = "tiff")]
+    tiff::FORMAT,
+    exr::FORMAT,
+    hdr::FORMAT,
+    ktx2::FORMAT,
+    tga::FORMAT,
+];
 
 /// The format of a file, by its first bytes, else by its name.
 ///

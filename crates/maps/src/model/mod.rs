@@ -4,8 +4,11 @@
 //! (area-weighted), map coordinates (`unwrap.rs`), tangents (MikkTSpace), and a camera and two lights that
 //! suit the model's size.
 
+#[cfg(feature = "gltf")]
 mod gltf;
+#[cfg(feature = "obj")]
 mod obj;
+#[cfg(feature = "ply")]
 mod ply;
 mod unwrap;
 
@@ -36,8 +39,15 @@ pub struct ModelFormat {
     read: ReadModel,
 }
 
-/// Every model format there is.
-pub static TABLE: &[ModelFormat] = &[gltf::FORMAT, obj::FORMAT, ply::FORMAT];
+/// Every model format there is, of those that the crate was built with.
+pub static TABLE: &[ModelFormat] = &[
+    #[cfg(feature = "gltf")]
+    gltf::FORMAT,
+    #[cfg(feature = "obj")]
+    obj::FORMAT,
+    #[cfg(feature = "ply")]
+    ply::FORMAT,
+];
 
 /// How to take a model.
 pub struct ModelOptions {
