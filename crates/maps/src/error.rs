@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// A file that could not be read or written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MapError {
     /// The operating system said no.
     #[error("{}: {source}", path.display())]

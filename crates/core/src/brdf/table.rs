@@ -31,6 +31,7 @@ pub static TABLE: &[Row] = &[
 
 /// A spelling that names no lobe.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ParseLobeError {
     /// No row of the table has this name.
     #[error("there is no BRDF called `{0}`")]
