@@ -1,6 +1,6 @@
 //! Ctrl-C: unfinished files are removed, then the program ends.
 
-/// Installs the handler. Exit status 130, as shells expect of an interrupted program.
+/// Installs the handler. It exits with status 130, as shells expect of an interrupted program.
 pub(crate) fn clean_up_when_interrupted() {
     let handler = || {
         ndfmap::maps::atomic::abandon_all();

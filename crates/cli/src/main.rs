@@ -11,8 +11,8 @@ use clap::Parser;
 use commands::Program;
 use ndfmap::Error;
 
-/// Bands of a bake come and go by the megabyte; the system's allocator gives each back and faults it in
-/// again.
+/// Allocator for the bands of a bake, which come and go by the megabyte: the system's gives each back and
+/// faults it in again.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
@@ -22,16 +22,16 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("ndfmap: {}", said(&error));
-            // 1 failed, 2 wrong usage.
+            // Status 1 stands for failed, 2 for wrong usage.
             ExitCode::from(if matches!(error, Error::Request(_)) { 2 } else { 1 })
         }
     }
 }
 
-/// An error, with what a user of the program can do about it.
+/// Message of an error, with advice to the user of the program.
 fn said(error: &Error) -> String {
     match error {
-        // Of an invalid shader no device is to blame.
+        // No device is to blame for an invalid shader.
         #[cfg(feature = "gpu")]
         Error::Gpu(gpu) if !matches!(gpu, ndfmap::gpu::GpuError::Shader(_)) => {
             format!("{error} (`--device cpu` renders without a GPU)")

@@ -1,11 +1,11 @@
-//! Tables for a terminal: reports of the library as text.
+//! Tables for a terminal: the library's reports as text.
 
 use ndfmap::choose::Choice;
 use ndfmap::compare::{Comparison, three_digits};
 use ndfmap::core::measure::FilteringError;
 use ndfmap::render::{DriftReport, RenderReport};
 
-/// A comparison: a row a method, a column a level.
+/// Table of a comparison: a row a method, a column a level.
 pub(crate) fn comparison(comparison: &Comparison) -> String {
     let (rows, brdf) = (&comparison.rows, &comparison.brdf);
     let name = rows.iter().map(|r| r.method.len()).max().unwrap_or(0).max("level".len());
@@ -45,7 +45,7 @@ pub(crate) fn comparison(comparison: &Comparison) -> String {
     text
 }
 
-/// A rendering: a row a method, and a line a truth.
+/// Table of a rendering: a row a method, and a line a truth.
 pub(crate) fn rendering(report: &RenderReport) -> String {
     let name = report.methods.iter().map(String::len).max().unwrap_or(0).max("method".len());
     let mut text =
@@ -79,7 +79,7 @@ pub(crate) fn rendering(report: &RenderReport) -> String {
     text
 }
 
-/// A choice: a row a candidate, and the reason.
+/// Table of a choice: a row a candidate, and the reason.
 pub(crate) fn choice(choice: &Choice) -> String {
     let levels = choice.levels.iter().map(usize::to_string).collect::<Vec<_>>().join(" and ");
     let mut text = format!("error between texels with {}, the worst of levels {levels}:\n", choice.lobe);

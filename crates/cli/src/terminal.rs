@@ -1,5 +1,5 @@
-//! The terminal as an observer: a progress bar on stderr, shown only when that is a terminal, and notes above
-//! it.
+//! The terminal as an observer: a progress bar on stderr, shown only when stderr is a terminal, with notes
+//! above it.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -9,7 +9,7 @@ use ndfmap::core::observe::Observer;
 /// Steps of a bar: finer than any terminal is wide.
 const STEPS: u64 = 1000;
 
-/// Observer that shows people how far the work is.
+/// Observer that shows people the progress of the work.
 #[derive(Default)]
 pub(crate) struct Terminal {
     bar: Mutex<Option<ProgressBar>>,

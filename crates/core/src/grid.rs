@@ -9,7 +9,7 @@ pub struct Size {
     pub height: usize,
 }
 
-/// A size with a zero in it.
+/// Error of a size with a zero in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a map needs at least one texel, not {width} × {height}")]
 pub struct EmptySize {
@@ -55,7 +55,7 @@ impl<T> Grid<T> {
         (texels.len() == size.area()).then_some(Self { size, texels })
     }
 
-    /// A row, to be changed.
+    /// Row `y`, mutable; it must lie inside.
     pub fn row_mut(&mut self, y: usize) -> &mut [T] {
         let width = self.size.width;
         &mut self.texels[y * width..][..width]

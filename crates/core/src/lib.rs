@@ -1,7 +1,7 @@
 //! ndfmap-core: the mathematics of filtering normals. No files, no GPU, no window.
 //!
-//! A *normal distribution map* is a mip pyramid whose texels say what the normals under them do, so that
-//! a highlight on a distant surface comes out as the mean of what it was up close. The way through:
+//! A *normal distribution map* is a mip pyramid whose texels hold the distribution of the normals under
+//! them, so that a highlight on a distant surface is the mean of its look up close. The way through:
 //!
 //! ```
 //! use glam::DVec3;

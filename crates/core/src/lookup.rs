@@ -1,7 +1,7 @@
-//! Filtered look-ups: what a texture unit makes of a pyramid at a place, for a pixel of a given reach.
+//! Filtered look-ups of a pyramid at a place, for a pixel of a given reach, as a texture unit does them.
 //!
-//! [`Texels`] has the filters, each once; a [`crate::pyramid::Pyramid`] as stored is one, and [`Lookup`], the
-//! same in floats with the channels of a texel side by side, is the fast one.
+//! [`Texels`] has the filters, each once. A [`crate::pyramid::Pyramid`] filters its texels as stored; a
+//! [`Lookup`], in floats with the channels of a texel side by side, is the fast one.
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -13,20 +13,20 @@ use crate::surface::{Wrap, Wraps};
 /// A texel that a filter reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Neighbour {
-    /// Its level.
+    /// Level of the texel.
     pub level: usize,
-    /// Its column.
+    /// Column of the texel.
     pub x: usize,
-    /// Its row.
+    /// Row of the texel.
     pub y: usize,
-    /// Its share; shares sum to one.
+    /// Weight of the texel; weights sum to one.
     pub weight: f64,
 }
 
-/// Where a pixel falls on the map, and how far it reaches.
+/// Footprint of a pixel: where it falls on the map, and how far it reaches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelFootprint {
-    /// Its centre, 0..1 over the map, v down the rows.
+    /// Centre of the pixel, 0..1 over the map, v down the rows.
     pub uv: DVec2,
     /// Change of `uv` to the next pixel on the right.
     pub duv_dx: DVec2,
@@ -34,7 +34,7 @@ pub struct PixelFootprint {
     pub duv_dy: DVec2,
 }
 
-/// How wide a filter is.
+/// Width of a filter, in taps and levels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Filtering {
     /// Trilinear taps along the longer axis of a pixel's reach, at most; 1 is plain trilinear filtering.
@@ -42,41 +42,41 @@ pub struct Filtering {
     /// Cuts the reach into this many parts on both axes, each looked up at a level so much finer: with 2,
     /// four times the taps, and a kernel nearer to the pixel's square.
     pub parts: usize,
-    /// Added to the level that the reach asks for; negative is sharper.
+    /// Bias added to the level that the reach asks for; negative is sharper.
     pub lod_bias: f64,
 }
 
 impl Filtering {
-    /// One tap, as a texture unit does it.
+    /// Trilinear filter of a texture unit: one tap.
     pub const TRILINEAR: Self = Self { max_taps: 1, parts: 1, lod_bias: 0.0 };
 
-    /// Up to so many taps along the longer axis, as a texture unit does it.
+    /// Anisotropic filter of a texture unit: up to so many taps along the longer axis.
     #[must_use]
     pub const fn anisotropic(max_taps: usize) -> Self {
         Self { max_taps, parts: 1, lod_bias: 0.0 }
     }
 
-    /// The same cut in two on both axes. A tent of two texels at the level where a texel is a pixel is far
-    /// wider than the pixel; four tents half as wide are not. It halves the error of every method's pictures
-    /// (`docs/methods.md`).
+    /// Anisotropic filter with the reach cut in two on both axes. A tent of two texels at the level where a
+    /// texel is a pixel is far wider than the pixel; four tents half as wide are not. This filter halves the
+    /// error of every method's pictures (`docs/methods.md`).
     #[must_use]
     pub const fn fine(max_taps: usize) -> Self {
         Self { max_taps, parts: 2, lod_bias: 0.0 }
     }
 }
 
-/// Who filters maps.
+/// Filter of map look-ups: our own taps, or the device's sampler.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sampling {
     /// Our own taps: the same on every device.
     Taps(Filtering),
-    /// The device's sampler, with so many taps at most; 1 is plain trilinear filtering. What comes out is the
-    /// device's choice; a renderer without such a device does what [`Self::filtering`] says.
+    /// The device's sampler, with so many taps at most; 1 is plain trilinear filtering. The result is the
+    /// device's choice; a renderer without such a device filters by [`Self::filtering`].
     Sampler(u16),
 }
 
 impl Sampling {
-    /// Our taps for it: for a sampler those that it is meant to take.
+    /// Filter by our own taps; for a sampler, the taps that it is meant to take.
     #[must_use]
     pub fn filtering(self) -> Filtering {
         match self {
@@ -86,29 +86,29 @@ impl Sampling {
     }
 }
 
-/// How a renderer looks maps up.
+/// Settings of a renderer's map look-ups.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lookups {
-    /// Who filters, and how wide.
+    /// Filter and its width.
     pub sampling: Sampling,
-    /// Shade every texel that the filter reads and mix the results: the reference for lobes that are not
-    /// aligned, and the only way for what cannot be filtered, which takes it unasked.
+    /// True to shade every texel that the filter reads and mix the results: the reference for lobes that are
+    /// not aligned, and the only way for methods that cannot be filtered, which take it unasked.
     pub neighbours: bool,
-    /// Take factors at the lobes' means, as the papers print it.
+    /// True to take factors at the lobes' means, as the papers print it.
     pub at_means: bool,
 }
 
 impl Lookups {
-    /// One trilinear tap of our own.
+    /// Look-ups by one trilinear tap of our own.
     pub const TRILINEAR: Self = Self::taps(Filtering::TRILINEAR);
 
-    /// Taps of our own.
+    /// Look-ups by taps of our own.
     #[must_use]
     pub const fn taps(filtering: Filtering) -> Self {
         Self { sampling: Sampling::Taps(filtering), neighbours: false, at_means: false }
     }
 
-    /// The device's sampler, with so many taps.
+    /// Look-ups by the device's sampler, with so many taps.
     #[must_use]
     pub const fn sampler(taps: u16) -> Self {
         Self { sampling: Sampling::Sampler(taps), neighbours: false, at_means: false }
@@ -127,7 +127,7 @@ pub struct Tap {
 /// The two texels beside a place on one axis, and their shares.
 #[inline]
 fn pair(t: f64, n: usize, wrap: Wrap) -> [(usize, f64); 2] {
-    // What is not finite, or so far away that floats have no texels there, is as good as anywhere.
+    // Any place will do for one that is not finite, or so far away that floats cannot tell texels apart.
     let t = if t.abs() < 1e15 { t } else { 0.0 };
     let t = match wrap {
         // The part after the point, by way of an integer, which is faster than a call of `floor`. Rounding
@@ -139,7 +139,7 @@ fn pair(t: f64, n: usize, wrap: Wrap) -> [(usize, f64); 2] {
         Wrap::Clamp => t.clamp(0.0, 1.0),
     };
     let at = t * n as f64 + 0.5;
-    // One more than the first texel, from 0 to n: what lies before it is the last one, or itself.
+    // Number of the second texel, from 0 to n. Before texel 0 lies the last texel, or texel 0 itself.
     let next = at as usize;
     let part = at - next as f64;
     let (before, after) = match wrap {
@@ -156,7 +156,7 @@ pub trait Texels {
     /// Sizes of the levels, finest first.
     fn sizes(&self) -> &[Size];
 
-    /// What lies beyond the edges.
+    /// Wrap of each axis, beyond the edges.
     fn wraps(&self) -> Wraps;
 
     /// Channels of a texel.
@@ -165,7 +165,7 @@ pub trait Texels {
     /// Adds a texel's channels times its weight.
     fn add(&self, place: Neighbour, sums: &mut [f32]);
 
-    /// The four texels around `uv` on one level, and what a bilinear filter weighs them.
+    /// The four texels around `uv` on one level, with their weights in a bilinear filter.
     #[inline]
     fn around(&self, level: usize, uv: DVec2) -> [Neighbour; 4] {
         let (size, wraps) = (self.sizes()[level], self.wraps());
@@ -186,10 +186,10 @@ pub trait Texels {
         (lod.floor() as usize, lod - lod.floor())
     }
 
-    /// The texels that a trilinear filter mixes, eight at most, and what it weighs them.
+    /// The texels that a trilinear filter mixes, eight at most, with their weights.
     ///
-    /// What shades each and blends the results shows what filtering should have given, at several times the
-    /// cost.
+    /// Shading each of them and blending the results shows what filtering should have given, at several times
+    /// the cost.
     fn neighbours(&self, tap: Tap) -> Vec<Neighbour> {
         let (level, t) = self.levels_of(tap.lod);
         let mut all = Vec::with_capacity(8);
@@ -311,8 +311,8 @@ pub struct Lookup {
     levels: Vec<Vec<f32>>,
 }
 
-/// Mean of what lies under texel (x, y) of a grid of another size over the same map: area by area, or where
-/// that grid is the finer, of the texels it lies in.
+/// Mean of the values under texel (x, y) of a grid of another size over the same map, weighted by area; where
+/// that grid is the finer one, mean of the texels that (x, y) lies in.
 #[must_use]
 pub fn area_mean(values: &Grid<[f32; 4]>, size: Size, x: usize, y: usize) -> [f32; 4] {
     let fine = values.size();
@@ -485,7 +485,7 @@ mod tests {
 
     #[test]
     fn anisotropic_stays_sharper_than_trilinear_along_the_short_axis() {
-        // Vertical stripes, a pixel that is long along them: anisotropic look-ups must still see them.
+        // Vertical stripes, and a pixel that is long along them: anisotropic look-ups must still see them.
         let size = Size { width: 64, height: 64 };
         let layout = Layout { size, layers: 1, precision: Precision::Single, wraps: Wraps::default() };
         let stripes = |s: &Size, value: &dyn Fn(usize) -> f32| {

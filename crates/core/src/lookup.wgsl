@@ -3,9 +3,9 @@
 // Levels are mixed here, between two look-ups at whole levels: that is the same on every device, which a
 // sampler's own choice and mix of levels is not.
 
-// Where a pixel falls on the map, and how far it reaches.
+// Footprint of a pixel: where it falls on the map, and how far it reaches.
 struct PixelFootprint {
-    // Its centre, 0..1 over the map, v down the rows.
+    // Centre of the pixel, 0..1 over the map, v down the rows.
     uv: vec2<f32>,
     // Change of `uv` to the next pixel on the right.
     duv_dx: vec2<f32>,
@@ -13,15 +13,15 @@ struct PixelFootprint {
     duv_dy: vec2<f32>,
 }
 
-// How wide a filter is.
+// Width of a filter, in taps and levels.
 struct Filtering {
     // Taps along the longer axis of a pixel's reach, at most.
     max_taps: u32,
     // Parts that the reach is cut into on both axes.
     parts: u32,
-    // Added to the level that the reach asks for.
+    // Bias added to the level that the reach asks for.
     lod_bias: f32,
-    // How many levels there are.
+    // Number of levels.
     levels: u32,
 }
 
@@ -31,7 +31,7 @@ struct Taps {
     along: vec2<f32>,
     across: vec2<f32>,
     lod: f32,
-    // Along the longer axis, and across it.
+    // Taps along the longer axis, and across it.
     columns: u32,
     rows: u32,
 }
@@ -116,7 +116,7 @@ fn level_count(finest: vec2<u32>) -> u32 {
     return levels;
 }
 
-// A texel that a filter reads; shares sum to one.
+// Texel that a filter reads; shares sum to one.
 struct Neighbour {
     texel: vec2<i32>,
     level: u32,
@@ -129,7 +129,7 @@ fn neighbour(map: texture_2d_array<f32>, uv: vec2<f32>, lod: f32, repeat: vec2<b
     let coarser = i / 4u;
     let level = u32(floor(lod)) + coarser;
     let share = select(1.0 - fract(lod), fract(lod), coarser == 1u);
-    // Asked for the size of a level that differs from pixel to pixel, lavapipe answers with another pixel's.
+    // Where the level differs from pixel to pixel, lavapipe answers with the size of another pixel's level.
     let size = max(textureDimensions(map) >> vec2<u32>(level), vec2<u32>(1u));
     let x = pair(uv.x, size.x, repeat.x);
     let y = pair(uv.y, size.y, repeat.y);

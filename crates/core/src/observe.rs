@@ -1,14 +1,15 @@
-//! Observers of long work: who is told how far it is, and who may stop it.
+//! Observers of long work, which are told how far it is and may stop it.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError, TryLockError};
 
-/// Observer of a piece of work. A closure that takes the fraction done is one that never stops it.
+/// Observer of a piece of work. A closure that takes the fraction done is an observer that never stops it.
 pub trait Observer: Sync {
     /// Told that another piece of the work begins, in words such as `bake vmf:4`; progress counts from 0
     /// again.
     fn begin(&self, _work: &str) {}
 
-    /// Told what a person may want to know, in a sentence without a full stop.
+    /// Told news that a person may want to know, in a sentence without a full stop.
     fn note(&self, _note: &str) {}
 
     /// Told the fraction done, from 0 to 1, by any thread and never less than before.
@@ -34,13 +35,13 @@ impl<F: Fn(f64) + Sync> Observer for F {
     }
 }
 
-/// Observer that looks away.
+/// Observer that ignores everything and never stops the work.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Unobserved;
 
 impl Observer for Unobserved {}
 
-/// Work that its observer stopped; nothing of it is left.
+/// Error of work that its observer stopped; no result of it is left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("cancelled")]
 pub struct Cancelled;
@@ -78,17 +79,18 @@ impl Observer for Part<'_> {
     }
 }
 
-/// Observer that hands on what its threads report, and nothing that runs backwards.
+/// Observer that hands on what threads report, except progress that would run backwards.
 pub struct Forward<'a> {
     observer: &'a dyn Observer,
     most: Mutex<f64>,
+    stopped: AtomicBool,
 }
 
 impl<'a> Forward<'a> {
     /// Nothing done.
     #[must_use]
     pub fn new(observer: &'a dyn Observer) -> Self {
-        Self { observer, most: Mutex::new(f64::NEG_INFINITY) }
+        Self { observer, most: Mutex::new(f64::NEG_INFINITY), stopped: AtomicBool::new(false) }
     }
 }
 
@@ -103,16 +105,30 @@ impl Observer for Forward<'_> {
     }
 
     fn progress(&self, fraction: f64) {
-        // Held while it is told, so that no other thread tells less after it.
-        let mut most = self.most.lock().unwrap_or_else(PoisonError::into_inner);
+        // Held while the observer is told, so that no other thread tells less after it. A thread that finds
+        // it held says nothing: it does not wait for a slow observer, nor for itself, where an observer's own
+        // parallel work runs a piece of ours.
+        let mut most = match self.most.try_lock() {
+            Ok(most) => most,
+            Err(TryLockError::Poisoned(most)) => most.into_inner(),
+            Err(TryLockError::WouldBlock) => return,
+        };
         if fraction > *most {
             *most = fraction;
             self.observer.progress(fraction);
         }
     }
 
+    /// True for ever once it was: work that a thread left out is never taken for done.
     fn cancelled(&self) -> bool {
-        self.observer.cancelled()
+        if self.stopped.load(Ordering::Relaxed) {
+            return true;
+        }
+        let cancelled = self.observer.cancelled();
+        if cancelled {
+            self.stopped.store(true, Ordering::Relaxed);
+        }
+        cancelled
     }
 }
 
@@ -146,5 +162,20 @@ mod tests {
         part.progress(0.5);
         assert_eq!(*stopped.0.lock().unwrap(), 0.625);
         assert_eq!(part.check(), Err(Cancelled));
+    }
+
+    #[test]
+    fn stopped_once_is_stopped_for_good() {
+        // An observer whose answer is consumed by the question.
+        struct Flicker(AtomicBool);
+        impl Observer for Flicker {
+            fn cancelled(&self) -> bool {
+                self.0.swap(false, Ordering::Relaxed)
+            }
+        }
+        let flicker = Flicker(AtomicBool::new(true));
+        let forward = Forward::new(&flicker);
+        assert!(forward.cancelled() && forward.cancelled());
+        assert_eq!(forward.check(), Err(Cancelled));
     }
 }

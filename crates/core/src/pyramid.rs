@@ -65,7 +65,7 @@ impl Precision {
                 assert_eq!(out.len(), values.len() * 2, "half floats take two bytes");
                 match bytemuck::try_cast_slice_mut::<u8, f16>(out) {
                     Ok(halves) => dispatch!(Level::new(), _simd => pack_halves(values, halves)),
-                    // Not aligned for 16-bit stores: by way of the stack.
+                    // Bytes that are not aligned for 16-bit stores go by way of the stack.
                     Err(_) => {
                         let mut chunk = [f16::ZERO; 256];
                         for (part, place) in values.chunks(256).zip(out.chunks_mut(512)) {
@@ -126,7 +126,7 @@ pub struct Pyramid {
     levels: Vec<Vec<u8>>,
 }
 
-/// Levels whose byte counts do not fit the sizes.
+/// Error of levels whose byte counts do not fit the sizes.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("level {level} should hold {expected} bytes and holds {found}")]
 pub struct LevelMismatch {
@@ -135,7 +135,7 @@ pub struct LevelMismatch {
     found: usize,
 }
 
-/// What a [`Pyramid`] is made of, apart from its levels.
+/// Layout of a [`Pyramid`]: everything but its levels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layout {
     /// Size of level 0.
@@ -144,7 +144,7 @@ pub struct Layout {
     pub layers: usize,
     /// Bits of a channel.
     pub precision: Precision,
-    /// What lies beyond the edges.
+    /// Wrap of each axis, beyond the edges.
     pub wraps: Wraps,
 }
 
@@ -177,7 +177,7 @@ impl Pyramid {
         Ok(Self { layers: layout.layers, precision: layout.precision, wraps: layout.wraps, sizes, levels })
     }
 
-    /// The same with its first layers alone: what a method of fewer layers reads of it.
+    /// Returns it with its first layers alone, as a method of fewer layers reads it.
     #[must_use]
     pub fn first_layers(&self, layers: usize) -> Self {
         let layers = layers.min(self.layers);
@@ -212,7 +212,7 @@ impl Pyramid {
         self.precision
     }
 
-    /// What lies beyond the edges.
+    /// Wrap of each axis, beyond the edges.
     #[must_use]
     pub fn wraps(&self) -> Wraps {
         self.wraps

@@ -1,8 +1,8 @@
 //! Shaders: the text that shades a filtered texel, for one method and one lobe.
 //!
 //! Beside each Rust function that a shader needs lies its twin in WGSL, of the same name. Declarations in
-//! WGSL may stand in any order, so linking is concatenation: constants, what all shaders share, the lobe, the
-//! method. There are no bindings and no entry points in it; textures, samplers and parameters come as
+//! WGSL may stand in any order, so linking is concatenation: constants, the texts that all shaders share, the
+//! lobe, the method. The text has no bindings and no entry points; textures, samplers and parameters come as
 //! arguments.
 
 use std::fmt::Display;
@@ -19,27 +19,27 @@ pub struct Shader {
     sources: &'static [&'static str],
 }
 
-/// What some methods and all environments have.
+/// Directions and spherical harmonics, which some methods and all environments need.
 const SPHERE: &str = include_str!("sphere.wgsl");
 
 impl Shader {
     /// Text of a method whose texels are shaded in this form, without constants or a table.
     ///
-    /// What the text must hold besides `decode` is said in the file of the form: `ndf/mixture.wgsl` or
-    /// `ndf/whole.wgsl`.
+    /// The file of the form, `ndf/mixture.wgsl` or `ndf/whole.wgsl`, says what the text must hold besides
+    /// `decode`.
     #[must_use]
     pub fn new(form: FormKind, sources: &'static [&'static str]) -> Self {
         Self { form, constants: String::new(), entries: 1, sources }
     }
 
-    /// The same, with a constant that the text refers to.
+    /// Returns it with a constant that the text refers to.
     #[must_use]
     pub fn constant(mut self, name: &str, value: impl Constant) -> Self {
         self.constants += &value.declare(name);
         self
     }
 
-    /// The same, with a table of so many entries, which [`Method::shader_table`] makes.
+    /// Returns it with a table of so many entries, which [`Method::shader_table`] makes.
     #[must_use]
     pub fn table(self, entries: usize) -> Self {
         Self { entries, ..self }
@@ -89,7 +89,7 @@ pub struct LobeTable {
 }
 
 impl LobeTable {
-    /// Zeros.
+    /// Table of zeros.
     #[must_use]
     pub fn new(entries: usize) -> Self {
         Self { entries: vec![[0.0; TABLE_ROUGHNESSES + 1]; entries] }
@@ -126,10 +126,10 @@ impl LobeTable {
 pub trait Constant: Display {
     /// Name of the type.
     const TYPE: &str;
-    /// What follows a number of this type.
+    /// Suffix of a number of this type.
     const SUFFIX: &str;
 
-    /// The declaration.
+    /// Declaration of a constant of this name.
     fn declare(&self, name: &str) -> String {
         format!("const {name}: {} = {self}{};\n", Self::TYPE, Self::SUFFIX)
     }
@@ -150,7 +150,7 @@ impl Constant for f32 {
     const SUFFIX: &str = "f";
 }
 
-/// What every shader has: what [`crate::brdf`] and [`crate::ndf`] have in common.
+/// Texts of every shader: those that all of [`crate::brdf`] and [`crate::ndf`] have in common.
 const SHARED: [&str; 4] = [
     include_str!("brdf/shading.wgsl"),
     include_str!("brdf/lambert.wgsl"),
@@ -193,7 +193,7 @@ pub fn link(method: &dyn Method, lobe: &dyn Lobe, attributes: usize) -> String {
     text
 }
 
-/// What environments share: [`crate::light`], [`crate::ndf`] under them.
+/// Texts of every environment: [`crate::light`], and [`crate::ndf`] under environments.
 const ENVIRONMENT: [&str; 6] = [
     include_str!("light/environment/environment.wgsl"),
     include_str!("light/environment/cube.wgsl"),
@@ -204,7 +204,7 @@ const ENVIRONMENT: [&str; 6] = [
 ];
 
 /// The text that lights texels by an environment, to stand beside what [`link`] makes: `reflect_environment`.
-/// What the host brings besides is said in `light/environment/environment.wgsl`.
+/// The file `light/environment/environment.wgsl` says what else the host must bring.
 #[must_use]
 pub fn link_environment(method: &dyn Method, lobe: &dyn Lobe) -> String {
     let own = method.shader();
@@ -217,7 +217,7 @@ pub fn link_environment(method: &dyn Method, lobe: &dyn Lobe) -> String {
     text
 }
 
-/// The text of one normal's reflection by a lobe, without a method: what a truth is made of.
+/// The text of one normal's reflection by a lobe, without a method, for truths.
 #[must_use]
 pub fn link_lobe(lobe: &dyn Lobe) -> String {
     let [brdf, lambert, masking, _] = SHARED;

@@ -11,7 +11,7 @@ use glam::{Vec2, Vec3};
 
 use crate::grid::{Grid, Size};
 
-/// What lies beyond the edge of a map, on one axis.
+/// Wrap of a map on one axis: how it goes on beyond its edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wrap {
     /// The map tiles.
@@ -65,7 +65,7 @@ pub fn normal_of_slope(slope: Vec2) -> Vec3 {
     Vec3::new(-slope.x, -slope.y, 1.0) * (1.0 + slope.length_squared()).sqrt().recip()
 }
 
-/// A stored vector as a unit normal; one that is no direction (zero or not finite) is `(0,0,1)`.
+/// Unit normal of a stored vector; `(0,0,1)` for a vector without a direction (zero or not finite).
 #[inline]
 #[must_use]
 pub fn unit_or_up(v: Vec3) -> Vec3 {
@@ -78,7 +78,7 @@ pub fn unit_or_up(v: Vec3) -> Vec3 {
     }
 }
 
-/// One row of the finest level: unit normals, and heights in texture widths.
+/// Row of the finest level: unit normals, and heights in texture widths.
 ///
 /// Planes, not structs, so that the loops over them become SIMD without being written as such.
 #[derive(Clone, Debug)]
@@ -91,8 +91,8 @@ pub struct SurfaceRow {
     pub z: Vec<f32>,
     /// Height; zero where the map has none.
     pub height: Vec<f32>,
-    /// Covariance of the slopes within each texel (xx, yy, xy), around that of its normal; empty where
-    /// nothing is known of it.
+    /// Covariance of the slopes within each texel (xx, yy, xy), around the slope of its normal; empty where
+    /// it is not known.
     pub spread: Vec<[f32; 3]>,
 }
 
@@ -129,7 +129,7 @@ pub trait Surface: Send + Sync {
     /// Width and height in texels.
     fn size(&self) -> Size;
 
-    /// What lies beyond the edges.
+    /// Wrap of each axis, beyond the edges.
     fn wraps(&self) -> Wraps;
 
     /// Overwrites all of `row` (as wide as the map) with row `y`; its `spread` too, if only to clear it.
@@ -140,7 +140,7 @@ pub trait Surface: Send + Sync {
         false
     }
 
-    /// The same with the slopes that the surface between its heights has, where it can tell them.
+    /// Returns it with the slopes of the surface between its heights, where it can tell them.
     fn with_exact_slopes(&self) -> Option<Arc<dyn Surface>> {
         None
     }
@@ -151,7 +151,7 @@ pub trait Surface: Send + Sync {
 pub struct NormalGrid {
     /// Unit normals.
     pub normals: Grid<Vec3>,
-    /// What lies beyond the edges.
+    /// Wrap of each axis, beyond the edges.
     pub wraps: Wraps,
 }
 
@@ -172,7 +172,7 @@ impl Surface for NormalGrid {
     }
 }
 
-/// How slopes are taken from heights.
+/// Filter that takes slopes from heights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SlopeFilter {
     /// `(h[i+1] - h[i-1]) / 2`: sharper, and what RenderMan's `txmake` does.
@@ -180,8 +180,8 @@ pub enum SlopeFilter {
     CentralDifference,
     /// The 3×3 Sobel kernel: smooths across the derivative; OpenImageIO's default.
     Sobel,
-    /// Of the bilinear surface through the heights, mean and covariance over each texel, exactly: what is
-    /// displaced has those slopes.
+    /// Slopes of the bilinear surface through the heights, which displaced meshes have: their mean and
+    /// covariance over each texel, exactly.
     Bilinear,
 }
 
@@ -218,9 +218,9 @@ fn bilinear_slopes(heights: [[f32; 3]; 3]) -> (Vec2, [f32; 3]) {
 pub struct HeightField {
     /// Heights in units of the texture's width.
     pub heights: Grid<f32>,
-    /// What lies beyond the edges; also used for the slopes there.
+    /// Wrap of each axis, beyond the edges; also used for the slopes there.
     pub wraps: Wraps,
-    /// How slopes are taken.
+    /// Filter that takes the slopes.
     pub filter: SlopeFilter,
 }
 
@@ -278,8 +278,8 @@ impl Surface for HeightField {
     }
 }
 
-/// How well a map's slopes are the gradient of *some* height, signed: 1 for a perfect gradient field,
-/// near 0 when nothing can be said (noise, a UV atlas), negative when y points the other way.
+/// Signed measure of how well a map's slopes are the gradient of *some* height: 1 for a perfect gradient
+/// field, near 0 when nothing can be said (noise, a UV atlas), negative when y points the other way.
 ///
 /// The mixed derivatives of a height agree, so slope.x differentiated along y and slope.y along x
 /// are correlated over all texels whose normals stay clear of the horizon (n.z > 0.15).

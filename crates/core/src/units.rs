@@ -1,11 +1,11 @@
 //! Widths of a reflectance lobe, each in its own type, so that no bare float is ever "roughness".
 //!
-//! All four say how far the microfacet normals stray; they differ in the quantity that is linear.
+//! All of them say how far the microfacet normals stray; they differ in the quantity that is linear.
 //! Conversions are named methods, and each states its source in `docs/notation.md`.
 
 use std::fmt;
 
-/// A width that is out of its range.
+/// Error of a width that is out of its range.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{unit} must be {range}, not {value}")]
 pub struct UnitError {
@@ -104,7 +104,7 @@ impl SlopeVariance {
     /// No spread at all.
     pub const ZERO: Self = Self(0.0);
 
-    /// The wider of this and nothing: clamps rounding below zero, and NaN, to zero.
+    /// Variance of at least zero: clamps rounding below zero, and NaN, to zero.
     #[must_use]
     pub fn clamped(value: f64) -> Self {
         Self(if value > 0.0 { value.min(f64::MAX) } else { 0.0 })

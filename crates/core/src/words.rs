@@ -1,12 +1,12 @@
-//! Enums that are spelled: one word for each variant, read and written in one place.
+//! Enums with a word for each variant, read and written in one place.
 
-/// Word that names no variant.
+/// Error of a word that names no variant.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{word}` is none of {known}")]
 pub struct UnknownWord {
     /// The word as written.
     pub word: String,
-    /// Every word there is, separated by commas.
+    /// Every known word, separated by commas.
     pub known: String,
 }
 

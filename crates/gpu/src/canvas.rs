@@ -1,4 +1,4 @@
-//! What is drawn on: targets of one size, and the sums that pictures are read from.
+//! Canvas: targets of one size to draw on, and the sums that pictures are read from.
 
 use glam::Vec3;
 use ndfmap_core::grid::{Grid, Size};
@@ -6,14 +6,14 @@ use ndfmap_scene::metrics::Picture;
 
 use crate::{Device, GpuError};
 
-/// How outlines are smoothed.
+/// Antialiasing of outlines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Antialiasing {
-    /// Not at all: one sample a pixel.
+    /// No antialiasing: one sample a pixel.
     Sharp,
-    /// By the hardware: four samples of coverage a pixel, one of shading.
+    /// Multisampling by the hardware: four samples of coverage a pixel, one of shading.
     Multisampled,
-    /// As the CPU renderer does it: pixels with an outline are drawn in 4 × 4 parts.
+    /// The CPU renderer's way: pixels with an outline are drawn in 4 × 4 parts.
     Parts,
 }
 
@@ -36,14 +36,14 @@ impl Antialiasing {
     }
 }
 
-/// What a pipeline knows of its target.
+/// Format of a target, as a pipeline needs it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct TargetFormat {
     pub(crate) format: wgpu::TextureFormat,
     pub(crate) samples: u32,
 }
 
-/// What of a target is kept.
+/// Contents of a target that a pass keeps.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Keep {
     /// Colours before the pass.
@@ -54,7 +54,7 @@ pub(crate) struct Keep {
     pub(crate) depths_after: bool,
 }
 
-/// What one pass draws on.
+/// Target of one pass.
 #[derive(Clone, Copy)]
 pub(crate) struct PassTarget<'a> {
     pub(crate) view: &'a wgpu::TextureView,
@@ -63,23 +63,22 @@ pub(crate) struct PassTarget<'a> {
     pub(crate) keep: Keep,
 }
 
-/// Texture of the caller's own to draw a frame on: its colours, linear radiance, and how they are to be
-/// drawn.
+/// Texture of the caller's own to draw a frame on in linear radiance, with the way to draw on it.
 #[derive(Clone, Copy)]
 pub struct Target<'a> {
-    /// Colours.
+    /// Colours: a view of the first level of a texture.
     pub view: &'a wgpu::TextureView,
-    /// Format that the view has. An sRGB format encodes what is drawn, a fixed-point one clamps it.
+    /// Format of the view. An sRGB format encodes the colours drawn, a fixed-point one clamps them.
     pub format: wgpu::TextureFormat,
     /// Depths, `Depth32Float`, 1 at the eye and 0 far away; `None` for depths of the renderer's own.
     pub depth: Option<&'a wgpu::TextureView>,
-    /// Keep what is on the texture (and in the caller's depths) and draw over it; else it is cleared to the
-    /// scene's background.
+    /// True to keep the texture's colours (and the caller's depths) and draw over them; else the texture is
+    /// cleared to the scene's background.
     pub keep: bool,
 }
 
 impl<'a> Target<'a> {
-    /// A texture to be cleared and drawn on, whole.
+    /// Whole texture, to be cleared and drawn on.
     #[must_use]
     pub fn new(view: &'a wgpu::TextureView, format: wgpu::TextureFormat) -> Self {
         Self { view, format, depth: None, keep: false }
@@ -106,9 +105,9 @@ pub struct Canvas {
     pub(crate) device: Device,
     pub(crate) size: Size,
     pub(crate) outlines: Antialiasing,
-    /// What passes draw on.
+    /// Texture that passes draw on.
     pub(crate) target: wgpu::TextureView,
-    /// Where several samples become one; `None` where there is but one.
+    /// Texture in which several samples become one; `None` for targets of one sample.
     pub(crate) resolved: Option<wgpu::TextureView>,
     pub(crate) depth: wgpu::TextureView,
     pub(crate) places: wgpu::TextureView,
@@ -147,7 +146,7 @@ impl Canvas {
         let TargetFormat { format, samples } = outlines.format();
         let drawn = wgpu::TextureUsages::RENDER_ATTACHMENT;
         let read = wgpu::TextureUsages::TEXTURE_BINDING;
-        // Where outlines are not looked for, their targets are but one pixel.
+        // Targets for finding outlines have one pixel where none are looked for.
         let one = wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 };
         let looked = if outlines == Antialiasing::Parts { extent } else { one };
         let stored = wgpu::TextureUsages::STORAGE_BINDING;
@@ -165,7 +164,7 @@ impl Canvas {
         })
     }
 
-    /// What passes draw on.
+    /// Target of the passes.
     pub(crate) fn pass_target(&self) -> PassTarget<'_> {
         PassTarget {
             view: &self.target,
@@ -183,7 +182,7 @@ impl Canvas {
     /// Waits for all work and reads the picture, in linear RGB.
     ///
     /// # Errors
-    /// What went wrong on the device.
+    /// [`GpuError`] of the device.
     pub fn read(&self) -> Result<Picture, GpuError> {
         let bytes = self.device.read(&self.sums)?;
         let values: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes);

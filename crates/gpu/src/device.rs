@@ -1,10 +1,10 @@
-//! The device: which GPU it is, and how its failures come back as errors.
+//! The device: a GPU, whose failures come back as errors.
 
 use std::sync::{Arc, Mutex};
 
 use crate::GpuError;
 
-/// A GPU to draw on: opened by us, or the caller's own. Cloned for nothing.
+/// GPU to draw on: opened by us, or the caller's own. A clone costs nothing.
 #[derive(Clone)]
 pub struct Device {
     pub(crate) device: wgpu::Device,
@@ -16,14 +16,14 @@ pub struct Device {
     failure: Arc<Mutex<Option<GpuError>>>,
 }
 
-/// What we use where it is there.
+/// Features that we use where the device has them.
 const WANTED: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::FLOAT32_FILTERABLE);
 
 /// Groups in a row of a dispatch; shaders count invocations by it.
 const GROUPS_IN_A_ROW: u32 = 1024;
 
 impl Device {
-    /// Opens the fastest GPU there is; where there is none, a software one.
+    /// Opens the fastest GPU, or a software one where there is no other.
     ///
     /// # Errors
     /// [`GpuError::NoAdapter`] and [`GpuError::NoDevice`].
@@ -31,7 +31,7 @@ impl Device {
         Self::open_with(WANTED)
     }
 
-    /// The same, with those of these features that it has.
+    /// Opens a GPU with those of these features that it has.
     pub(crate) fn open_with(wanted: wgpu::Features) -> Result<Self, GpuError> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
         let options = wgpu::RequestAdapterOptions {
@@ -60,8 +60,8 @@ impl Device {
         Ok(Self { failure, ..Self::from_wgpu(device, queue) })
     }
 
-    /// The caller's own device, with its queue. Whoever opened it hears of its errors, which we do not listen
-    /// for; a device with [`wgpu::Features::FLOAT32_FILTERABLE`] takes maps of single floats.
+    /// Wraps the caller's own device and queue. We do not listen for its errors; whoever opened it does.
+    /// A device with [`wgpu::Features::FLOAT32_FILTERABLE`] takes maps of single floats.
     #[must_use]
     pub fn from_wgpu(device: wgpu::Device, queue: wgpu::Queue) -> Self {
         let info = device.adapter_info();
@@ -69,42 +69,42 @@ impl Device {
         Self { device, queue, name: info.name, backend: info.backend, software, failure: Arc::default() }
     }
 
-    /// The device, as wgpu has it.
+    /// Device and queue of wgpu.
     #[must_use]
     pub fn wgpu(&self) -> (&wgpu::Device, &wgpu::Queue) {
         (&self.device, &self.queue)
     }
 
-    /// The adapter's name, its interface to us, and whether it is software.
+    /// Description: the adapter's name, its interface to us, and whether it is software.
     #[must_use]
     pub fn description(&self) -> String {
         let software = if self.software { ", software" } else { "" };
         format!("{} ({:?}{software})", self.name, self.backend)
     }
 
-    /// True for a GPU that the processor plays.
+    /// True for a software GPU, which runs on the processor.
     #[must_use]
     pub fn is_software(&self) -> bool {
         self.software
     }
 
-    /// True where the time of a pass is measured by the device itself.
+    /// True where the device itself measures the time of a pass.
     #[must_use]
     pub fn has_timestamps(&self) -> bool {
         self.device.features().contains(wgpu::Features::TIMESTAMP_QUERY)
     }
 
-    /// The adapter's name alone.
+    /// Name of the adapter alone.
     pub(crate) fn name(&self) -> String {
         self.name.clone()
     }
 
-    /// Waits for all work, and says what went wrong since the last time, if anything.
+    /// Waits for all work, and reports a failure since the last time, if any.
     ///
     /// # Errors
-    /// What the driver complained about.
+    /// [`GpuError`] that the driver raised.
     pub fn wait(&self) -> Result<(), GpuError> {
-        // Where the driver reports a loss while it is waited for, wgpu panics.
+        // wgpu panics where the driver reports a loss during the wait.
         let wait = || self.device.poll(wgpu::PollType::wait_indefinitely());
         let waited = std::panic::catch_unwind(std::panic::AssertUnwindSafe(wait));
         let lost = |reason: String| GpuError::Lost { adapter: self.name(), reason };
@@ -114,7 +114,7 @@ impl Device {
             Ok(Ok(_)) => {}
         }
         let mut noted = self.failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        // What is lost stays lost.
+        // A lost device stays lost.
         let failure =
             if matches!(*noted, Some(GpuError::Lost { .. })) { noted.clone() } else { noted.take() };
         failure.map_or(Ok(()), Err)
@@ -154,7 +154,7 @@ impl Device {
     /// twins.
     ///
     /// # Errors
-    /// What the driver complains about, an invalid shader included.
+    /// [`GpuError`] that the driver raises, for an invalid shader too.
     #[doc(hidden)]
     pub fn compute(&self, shader: &str, input: &[u8], output: u64, count: u32) -> Result<Vec<u8>, GpuError> {
         self.check_bytes("the inputs", input.len() as u64)?;
@@ -173,7 +173,7 @@ impl Device {
         self.read(&output)
     }
 
-    /// A buffer that shaders read. (Filled by the queue: filling one as it is made panics on a lost device.)
+    /// Buffer that shaders read. (The queue fills it: a buffer filled at creation panics on a lost device.)
     pub(crate) fn upload(&self, bytes: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
         let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: None,
@@ -185,7 +185,7 @@ impl Device {
         buffer
     }
 
-    /// A buffer that shaders write and we read.
+    /// Buffer that shaders write and we read.
     pub(crate) fn storage(&self, what: &'static str, size: u64) -> Result<wgpu::Buffer, GpuError> {
         self.check_bytes(what, size)?;
         Ok(self.device.create_buffer(&wgpu::BufferDescriptor {
@@ -196,7 +196,7 @@ impl Device {
         }))
     }
 
-    /// The pipeline of a shader's entry point `main`, which may count invocations by ROW.
+    /// Pipeline of a shader's entry point `main`, which may count invocations by ROW.
     pub(crate) fn compute_pipeline(&self, shader: &str) -> wgpu::ComputePipeline {
         let shader = format!("const ROW: u32 = {}u;\n{shader}", 64 * GROUPS_IN_A_ROW);
         let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
@@ -213,7 +213,7 @@ impl Device {
         })
     }
 
-    /// Commands to be recorded.
+    /// Encoder for new commands.
     pub(crate) fn encoder(&self) -> wgpu::CommandEncoder {
         self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
     }
@@ -223,14 +223,14 @@ impl Device {
         self.queue.submit([encoder.finish()]);
     }
 
-    /// Runs it once for each of `count`, in groups of 64.
+    /// Runs a pipeline once for each of `count`, in groups of 64.
     pub(crate) fn dispatch(&self, pipeline: &wgpu::ComputePipeline, group: &wgpu::BindGroup, count: u32) {
         let mut encoder = self.encoder();
         record_dispatch(&mut encoder, pipeline, group, count);
         self.submit(encoder);
     }
 
-    /// The bytes of a buffer, once all work is done.
+    /// Bytes of a buffer, once all work is done.
     pub(crate) fn read(&self, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
         let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("readback"),
@@ -272,7 +272,7 @@ pub(crate) fn record_dispatch(
     let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
     pass.set_pipeline(pipeline);
     pass.set_bind_group(0, group, &[]);
-    // Groups in a row are few by the standard: the rest goes to rows.
+    // The standard allows few groups in a row: the rest goes to further rows.
     let groups = count.div_ceil(64);
     let columns = groups.min(GROUPS_IN_A_ROW);
     pass.dispatch_workgroups(columns, groups.div_ceil(columns), 1);

@@ -25,7 +25,7 @@ pub(crate) struct EnvironmentUniform {
     technique: u32,
 }
 
-/// What the passes bind of an environment; dark, where there is none.
+/// Bindings of the passes to an environment; dark without one.
 pub(crate) struct Bound {
     pub(crate) uniform: EnvironmentUniform,
     pub(crate) radiance: wgpu::TextureView,
@@ -41,7 +41,7 @@ pub(crate) struct Environments {
     last: Mutex<Option<Uploaded>>,
 }
 
-/// An environment's textures, as far as they were asked for.
+/// Textures of an environment, as far as they were asked for.
 struct Uploaded {
     of: Arc<FilteredEnvironment>,
     radiance: wgpu::TextureView,
@@ -49,7 +49,7 @@ struct Uploaded {
     blurred: Vec<(Microfacets, wgpu::TextureView)>,
 }
 
-/// Half floats end at 65504: what is brighter is stored as a part of it.
+/// Scale that brings radiance into the range of half floats, which end at 65504.
 fn scale(environment: &FilteredEnvironment) -> f32 {
     let brightest = environment.radiance.texels(0).iter().map(|v| v.max_element()).fold(0.0, f32::max);
     (brightest / 60_000.0).max(1.0)
@@ -76,7 +76,7 @@ impl Environments {
         })
     }
 
-    /// What the scene's passes bind.
+    /// Bindings of the scene's passes.
     pub(crate) fn bind(&self, environment: Option<&SceneEnvironment>) -> Result<Bound, GpuError> {
         let Some(environment) = environment else {
             let (radiance, half_vectors) = (self.dark_cube.clone(), self.dark.clone());
@@ -99,6 +99,10 @@ impl Environments {
             scale: scale(filtered),
             technique: environment.technique.index(),
         };
+        if environment.technique == Technique::Harmonics {
+            // Before the lock is taken: all threads work it out.
+            let _ = filtered.half_vectors();
+        }
         self.with(environment, |uploaded| {
             if environment.technique == Technique::Harmonics && uploaded.half_vectors.is_none() {
                 let texels: Vec<[f32; 4]> = filtered
@@ -115,7 +119,7 @@ impl Environments {
         })
     }
 
-    /// What a material binds: its table, and the cubes that facets like its own have blurred.
+    /// Bindings of a material: its table, and the cubes that facets like its own have blurred.
     pub(crate) fn bind_material(
         &self,
         environment: Option<&SceneEnvironment>,
@@ -131,6 +135,8 @@ impl Environments {
             return Ok((table, self.dark_cube.clone()));
         }
         let microfacets = split_sum.microfacets;
+        // Before the lock is taken: all threads work it out.
+        environment.filtered.make(environment.technique, microfacets);
         let cube = self.with(environment, |uploaded| {
             if let Some((_, made)) = uploaded.blurred.iter().find(|(k, _)| *k == microfacets) {
                 return Ok(made.clone());

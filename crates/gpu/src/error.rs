@@ -1,13 +1,13 @@
-//! What can go wrong on a GPU, in words that say what to do.
+//! Errors on a GPU, in words that say what to do.
 
 /// A failure of the GPU, or of what was asked of it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GpuError {
-    /// The observer wanted no more.
+    /// The observer cancelled.
     #[error(transparent)]
     Cancelled(#[from] ndfmap_core::observe::Cancelled),
-    /// No adapter, not even a software one.
+    /// There is no adapter, not even a software one.
     #[error(
         "there is no GPU that can be used, and no software one (such as lavapipe, package mesa-vulkan-drivers)"
     )]
@@ -15,9 +15,9 @@ pub enum GpuError {
     /// The adapter gave no device.
     #[error("{adapter} cannot be opened: {reason}")]
     NoDevice {
-        /// Its name.
+        /// Name of the adapter.
         adapter: String,
-        /// What it says.
+        /// Reason that the adapter gives.
         reason: String,
     },
     /// A texture that is larger than textures can be.
@@ -25,7 +25,7 @@ pub enum GpuError {
         "{what} of {width} × {height} in {layers} layers is too large for {adapter}, which takes {most} × {most} in {most_layers}"
     )]
     TooLarge {
-        /// What is too large.
+        /// Thing that is too large.
         what: String,
         /// Texels, or pixels.
         width: u32,
@@ -35,9 +35,9 @@ pub enum GpuError {
         layers: u32,
         /// The adapter's name.
         adapter: String,
-        /// Its largest side.
+        /// Largest side that it takes.
         most: u32,
-        /// Its most layers.
+        /// Most layers that it takes.
         most_layers: u32,
     },
     /// A picture without a pixel.
@@ -48,9 +48,9 @@ pub enum GpuError {
     Unsupported {
         /// The adapter's name.
         adapter: String,
-        /// What it lacks.
+        /// Feature that it lacks.
         feature: &'static str,
-        /// What to do instead.
+        /// Advice: what to do instead.
         instead: &'static str,
     },
     /// The device went away.
@@ -58,7 +58,7 @@ pub enum GpuError {
     Lost {
         /// The adapter's name.
         adapter: String,
-        /// What the driver says.
+        /// Message of the driver.
         reason: String,
     },
     /// Memory ran out.
@@ -72,7 +72,7 @@ pub enum GpuError {
     Driver {
         /// The adapter's name.
         adapter: String,
-        /// What it says.
+        /// Message of the driver or of wgpu.
         reason: String,
     },
 }

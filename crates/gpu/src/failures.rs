@@ -1,4 +1,4 @@
-//! Tests: what goes wrong on a device comes back as an error that says what.
+//! Tests: failures on a device come back as errors that say what failed.
 
 use ndfmap_core::grid::Size;
 use ndfmap_core::lookup::Lookups;
@@ -9,7 +9,7 @@ use ndfmap_scene::{Scene, SceneOptions};
 use crate::{Antialiasing, Canvas, Device, Frame, Geometry, GpuError, Maps, Renderer, SceneView};
 use ndfmap_core::ndf::AnyMethod;
 
-/// A device with only some of the features we use; `None` skips, where the tests are not told to insist.
+/// Device with only some of the features we use; `None` skips tests that need not insist.
 fn device(features: wgpu::Features) -> Option<Device> {
     match Device::open_with(features) {
         Err(e @ GpuError::NoAdapter) if std::env::var_os("NDFMAP_REQUIRE_GPU").is_none() => {

@@ -25,10 +25,10 @@ pub(crate) struct Triangle {
     grad_v: Vec4,
 }
 
-/// A run of triangles of one material.
+/// Run of triangles of one material.
 pub(crate) struct Part {
     pub(crate) material: usize,
-    /// First corner, and past the last.
+    /// Corners, from the first to past the last.
     pub(crate) corners: std::ops::Range<u32>,
 }
 
@@ -38,13 +38,13 @@ pub struct Geometry {
     pub(crate) corners: wgpu::Buffer,
     pub(crate) triangles: wgpu::Buffer,
     pub(crate) parts: Vec<Part>,
-    /// What places are relative to: single floats then have their digits where the scene is.
+    /// Origin of places: single floats then have their digits where the scene is.
     pub(crate) middle: DVec3,
     pub(crate) radius: f64,
 }
 
 impl Geometry {
-    /// Uploads the meshes; those with relief as they are without. [`crate::Meshes`] cuts those.
+    /// Uploads the meshes without their relief; [`crate::Meshes`] cuts the meshes that have it.
     ///
     /// # Errors
     /// [`GpuError`] for a scene larger than the device's buffers.
@@ -72,7 +72,7 @@ impl Geometry {
         (vertices, triangles): (u64, u64),
         (middle, radius): (DVec3, f64),
     ) -> Result<Self, GpuError> {
-        // A scene of nothing still needs buffers.
+        // An empty scene still needs buffers.
         let room =
             |what: &'static str, count: u64, each: usize| device.storage(what, count.max(1) * each as u64);
         Ok(Self {
@@ -101,13 +101,13 @@ impl Geometry {
         write(&self.triangles, triangle * size_of::<Triangle>(), bytemuck::cast_slice(triangles));
     }
 
-    /// How many triangles there are.
+    /// Number of triangles.
     #[must_use]
     pub fn len(&self) -> usize {
         self.parts.last().map_or(0, |part| part.corners.end as usize / 3)
     }
 
-    /// True for a scene of nothing.
+    /// True for an empty scene.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0

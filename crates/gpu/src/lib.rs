@@ -1,11 +1,11 @@
-//! ndfmap-gpu: the scenes of `ndfmap-core` in real time, through the same maps, and shaders for other
+//! ndfmap-gpu: the scenes of `ndfmap-scene` in real time, through the same maps, and shaders for other
 //! programs.
 //!
 //! [`export`] writes a method's shader in the language of another program. [`link`] joins the text of core's
 //! shaders with the passes here and checks it. Both need no GPU.
 //!
 //! With the feature `render` (a default), `Device` is a GPU, ours or the caller's own. `Maps` are a scene's
-//! baked materials in its memory, `Renderer` draws them, frame after frame, while camera, lights, lobes and
+//! baked materials in its memory. `Renderer` draws them, frame after frame, while camera, lights, lobes and
 //! colours change: on a `Canvas` of ours that is read back, or recorded into the caller's commands on the
 //! caller's texture.
 

@@ -7,32 +7,32 @@ use ndfmap_core::shader::{self, LOOKUP};
 
 use crate::GpuError;
 
-/// The pass that draws, in all its ways to look maps up.
+/// Pass that draws, with an entry point for each way to look maps up.
 pub const DRAW: &str = include_str!("passes/draw.wgsl");
 
-/// What draw passes share: the camera, the lights, the triangles.
+/// Common part of the draw passes: the camera, the lights, the triangles.
 const SCENE: &str = concat!(include_str!("passes/vertices.wgsl"), "\n", include_str!("passes/scene.wgsl"));
 
-/// What passes that shade know of a material.
+/// Material, as the passes that shade know it.
 const MATERIAL: &str = include_str!("passes/material.wgsl");
 
-/// What the pass that draws brings to an environment's shading.
+/// Bindings that the pass that draws brings to an environment's shading.
 const SURROUNDINGS: &str = include_str!("passes/environment.wgsl");
 
-/// The pass that draws the truth.
+/// Pass that draws the truth.
 const TRUTH: &str = include_str!("passes/truth.wgsl");
 
-/// The pass that draws places and faces.
+/// Pass that draws places and faces.
 #[cfg(feature = "render")]
 const PLACE: &str = include_str!("passes/place.wgsl");
 
-/// A checked shader.
+/// Checked shader.
 pub struct Linked {
-    /// Its text.
+    /// Text of the shader.
     pub text: String,
-    /// The same, parsed.
+    /// Text parsed by naga.
     pub module: naga::Module,
-    /// What is known of it.
+    /// Facts that naga's validation found.
     pub info: ModuleInfo,
 }
 
@@ -49,7 +49,7 @@ pub fn check(text: String) -> Result<Linked, GpuError> {
     Ok(Linked { text, module, info })
 }
 
-/// The shader that draws a method with a lobe; see [`shader::link`] for `attributes`.
+/// Links the shader that draws a method with a lobe; see [`shader::link`] for `attributes`.
 ///
 /// # Errors
 /// [`GpuError::Shader`].
@@ -58,7 +58,7 @@ pub fn draw(method: &dyn Method, lobe: &dyn Lobe, attributes: usize) -> Result<L
     check([&own, &lit, LOOKUP, SCENE, MATERIAL, SURROUNDINGS, DRAW].join("\n"))
 }
 
-/// The shader that draws the truth of a lobe. It has no method in it.
+/// Links the shader that draws the truth of a lobe, without any method.
 ///
 /// # Errors
 /// [`GpuError::Shader`].
@@ -66,7 +66,7 @@ pub fn truth(lobe: &dyn Lobe) -> Result<Linked, GpuError> {
     check([&shader::link_lobe(lobe), SCENE, MATERIAL, TRUTH].join("\n"))
 }
 
-/// The shader that draws places and faces, for outlines.
+/// Links the shader that draws places and faces, for outlines.
 #[cfg(feature = "render")]
 pub(crate) fn place() -> Result<Linked, GpuError> {
     check([SCENE, PLACE].join("\n"))

@@ -17,23 +17,23 @@ use ndfmap_scene::{BakedMaterial, Material, SurfaceTextures};
 
 use crate::{Device, GpuError};
 
-/// A material's textures.
+/// Textures of a material.
 pub(crate) struct Textures {
     pub(crate) map: wgpu::TextureView,
     pub(crate) params: wgpu::TextureView,
-    /// Attributes that the map's lobes carry.
+    /// Number of attributes that the map's lobes carry.
     pub(crate) attributes: usize,
-    /// Colours in `params`.
+    /// Number of colours in `params`.
     pub(crate) mapped: u32,
-    /// The least and the most roughness, where it is mapped.
+    /// Least and most roughness, where a texture holds it.
     pub(crate) roughness: Option<(SlopeVariance, SlopeVariance)>,
     pub(crate) size: Size,
     pub(crate) wraps: Wraps,
-    /// What the last frame bound.
+    /// Group that the last frame bound, with its key.
     pub(crate) bound: Mutex<Option<(BindKey, wgpu::BindGroup)>>,
 }
 
-/// What a material's group is made of, besides its textures: while it is the same, so is the group.
+/// Contents of a material's group besides its textures: while they are the same, so is the group.
 #[derive(Clone, PartialEq)]
 pub(crate) struct BindKey {
     /// Number of the renderer.
@@ -43,12 +43,11 @@ pub(crate) struct BindKey {
     pub(crate) at_means: bool,
     /// Taps of the device's sampler.
     pub(crate) taps: u16,
-    /// What the environment makes of the material: which environment, by its place in memory, and how
-    /// highlights look it up.
+    /// Environment, by its place in memory, and the way highlights look it up.
     pub(crate) environment: Option<Surrounding>,
 }
 
-/// An environment, held so that its place in memory is no other's.
+/// Environment, held so that no other takes its place in memory.
 #[derive(Clone)]
 pub(crate) struct Surrounding(pub(crate) Arc<FilteredEnvironment>, pub(crate) Technique);
 
@@ -58,9 +57,9 @@ impl PartialEq for Surrounding {
     }
 }
 
-/// The maps of a scene's materials, baked with one method. Camera, lights, lobes, models and meshes may
-/// change after, and colours and roughness but for this: a material keeps the `textures` that it was baked
-/// with, or has none still.
+/// Maps of a scene's materials, baked with one method. Camera, lights, lobes, shading models and meshes may
+/// change afterwards. Colours and roughness may change too, except that a material keeps the `textures` that
+/// it was baked with, and one without `textures` stays without.
 pub struct Maps {
     pub(crate) method: AnyMethod,
     pub(crate) materials: Vec<Textures>,
@@ -70,7 +69,7 @@ impl Maps {
     /// Bakes every material's map and uploads it.
     ///
     /// # Errors
-    /// [`GpuError`] for maps that the device cannot hold or filter, and where the observer wants no more.
+    /// [`GpuError`] for maps that the device cannot hold or filter, and where the observer cancels.
     pub fn new(
         device: &Device,
         materials: &[Material],
@@ -104,7 +103,7 @@ impl Textures {
         })
     }
 
-    /// Normals of the finest level, one by one, and what they are made of: for the truth.
+    /// Normals of the finest level, one by one, with their colours and roughness, for the truth.
     pub(crate) fn finest(device: &Device, material: &Material) -> Result<Self, GpuError> {
         let (size, wraps) = (material.map.size(), material.map.wraps());
         let what = format!("the map of material `{}`", material.name);
@@ -131,7 +130,7 @@ impl Textures {
     }
 }
 
-/// The sampler for maps with these wraps; `anisotropy` 1 is plain trilinear filtering.
+/// Sampler for maps with these wraps; `anisotropy` 1 is plain trilinear filtering.
 pub(crate) fn sampler(device: &Device, wraps: Wraps, anisotropy: u16) -> wgpu::Sampler {
     let mode = |wrap| match wrap {
         Wrap::Repeat => wgpu::AddressMode::Repeat,
@@ -149,7 +148,7 @@ pub(crate) fn sampler(device: &Device, wraps: Wraps, anisotropy: u16) -> wgpu::S
     })
 }
 
-/// How texels lie in a texture.
+/// Layout of a texture.
 #[derive(Clone, Copy)]
 pub(crate) struct Stored {
     pub(crate) layers: usize,
@@ -224,7 +223,7 @@ fn upload_pyramid(device: &Device, what: &str, pyramid: &Pyramid) -> Result<wgpu
         }
     };
     let sizes = pyramid.sizes();
-    // OpenGL takes an array of one layer for no array, and reads nothing: a second one costs little.
+    // OpenGL takes an array of one layer for no array, and reads nothing: a second layer costs little.
     let stored = Stored { layers: pyramid.layers().max(2), levels: sizes.len(), format };
     let texture = create(device, what, sizes[0], stored)?;
     for (level, size) in sizes.iter().enumerate() {
@@ -233,7 +232,7 @@ fn upload_pyramid(device: &Device, what: &str, pyramid: &Pyramid) -> Result<wgpu
     Ok(array_view(&texture))
 }
 
-/// Colours, one a layer; a single dark texel where there are none.
+/// Uploads colours, one a layer; without colours, a single dark texel.
 fn finish(
     device: &Device,
     name: &str,

@@ -1,4 +1,4 @@
-//! Pipelines: made when first asked for, kept for every frame after.
+//! Pipelines, made on first use and kept for every frame after.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,7 +9,7 @@ use ndfmap_core::ndf::Method;
 use crate::canvas::{Antialiasing, DEPTH, PLACE, TargetFormat};
 use crate::{Device, GpuError, link};
 
-/// What a pipeline is kept under.
+/// Key that a pipeline is kept under.
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub(crate) enum Key {
     /// A method (its spelling), a lobe (its text), attributes, the entry point, the target.
@@ -20,19 +20,19 @@ pub(crate) enum Key {
     Place,
 }
 
-/// Layouts that all pipelines share, and the pipelines.
+/// Pipelines, and the layouts that all of them share.
 pub(crate) struct Pipelines {
     device: Device,
     /// Group 0: view, lights, triangles, mask, environment.
     pub(crate) scene: wgpu::BindGroupLayout,
-    /// Group 1 of [`Key::Draw`]: material, map, colours, sampler, what it makes of an environment.
+    /// Group 1 of [`Key::Draw`]: material, map, colours, sampler, and its table and cubes for an environment.
     pub(crate) material: wgpu::BindGroupLayout,
     /// Group 1 of [`Key::Truth`]: material, normals, colours.
     pub(crate) finest: wgpu::BindGroupLayout,
     made: Mutex<HashMap<Key, Arc<wgpu::RenderPipeline>>>,
 }
 
-/// A binding that vertices and fragments see.
+/// Binding that vertices and fragments see.
 fn entry(binding: u32, ty: wgpu::BindingType) -> wgpu::BindGroupLayoutEntry {
     let visibility = wgpu::ShaderStages::VERTEX_FRAGMENT;
     wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None }
@@ -94,7 +94,7 @@ impl Pipelines {
         Self { device: device.clone(), scene, material, finest, made: Mutex::default() }
     }
 
-    /// The pipeline that draws a method with a lobe.
+    /// Pipeline that draws a method with a lobe.
     pub(crate) fn draw(
         &self,
         (method, lobe): (&dyn Method, &dyn Lobe),
@@ -113,7 +113,7 @@ impl Pipelines {
         })
     }
 
-    /// The pipeline that draws the truth of a lobe.
+    /// Pipeline that draws the truth of a lobe.
     pub(crate) fn truth(&self, lobe: &dyn Lobe) -> Result<Arc<wgpu::RenderPipeline>, GpuError> {
         self.get(Key::Truth(lobe.shader().into_owned()), || {
             let text = link::truth(lobe)?.text;
@@ -125,7 +125,7 @@ impl Pipelines {
         })
     }
 
-    /// The pipeline that draws places and faces.
+    /// Pipeline that draws places and faces.
     pub(crate) fn place(&self) -> Result<Arc<wgpu::RenderPipeline>, GpuError> {
         self.get(Key::Place, || {
             let text = link::place()?.text;
@@ -156,7 +156,7 @@ impl Pipelines {
     }
 }
 
-/// What a pipeline is built from.
+/// Parts that a pipeline is built from.
 struct PipelineDescriptor<'a> {
     text: &'a str,
     entry: &'static str,

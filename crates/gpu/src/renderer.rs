@@ -1,4 +1,4 @@
-//! Drawing: a scene's triangles, through baked maps or as they are, on a canvas.
+//! Renderer: draws a scene's triangles, through baked maps or as they are, on a canvas.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -21,31 +21,31 @@ use crate::pipelines::Pipelines;
 use crate::uniforms::{self, LightUniform, View};
 use crate::{Device, GpuError};
 
-/// A scene as it is now. Its triangles are those of `geometry`; materials, lights and background may have
-/// changed since.
+/// Scene as it is now. Its triangles are those of `geometry`; materials, lights and background may have
+/// changed since those were uploaded.
 #[derive(Clone, Copy)]
 pub struct SceneView<'a> {
     /// The scene.
     pub scene: &'a Scene,
-    /// Its triangles.
+    /// Triangles of the scene.
     pub geometry: &'a Geometry,
-    /// Where it is seen from.
+    /// Camera that sees it.
     pub camera: &'a Camera,
 }
 
-/// A frame to be drawn: a scene, seen through baked maps.
+/// Frame to be drawn: a scene, seen through baked maps.
 #[derive(Clone, Copy)]
 pub struct Frame<'a> {
     /// The scene.
     pub view: SceneView<'a>,
-    /// The maps of its materials, baked on the renderer's device.
+    /// Maps of its materials, baked on the renderer's device.
     pub maps: &'a Maps,
-    /// How they are looked up.
+    /// Look-ups of the maps.
     pub lookups: Lookups,
 }
 
-/// Renderer on one device. Keeps what is made for one frame and good for the next: pipelines, samplers,
-/// groups, environments.
+/// Renderer on one device. It keeps all that the next frame can use again: pipelines, samplers, groups,
+/// environments.
 pub struct Renderer {
     device: Device,
     /// Number that no other renderer has.
@@ -57,34 +57,34 @@ pub struct Renderer {
     samplers: Mutex<Vec<(SamplerKey, wgpu::Sampler)>>,
     /// Depths for targets that come without.
     depth: Mutex<Option<wgpu::TextureView>>,
-    /// Stands for a mask where there is none.
+    /// Stand-in for a mask in passes without one.
     no_mask: wgpu::TextureView,
 }
 
-/// What a sampler is made of.
+/// Key that a sampler is kept under.
 #[derive(Clone, Copy, PartialEq)]
 struct SamplerKey {
     wraps: Wraps,
     taps: u16,
 }
 
-/// What a pass draws with: for each material its pipeline and its group.
+/// Bindings of a pass to a material: its pipeline and its group.
 pub(crate) struct MaterialBindings {
     pipeline: Arc<wgpu::RenderPipeline>,
     group: wgpu::BindGroup,
 }
 
-/// One pass over all triangles.
+/// Pass over all triangles.
 pub(crate) struct Pass<'a> {
     pub(crate) target: PassTarget<'a>,
     pub(crate) view: View,
-    /// For each material.
+    /// Bindings, one for each material.
     pub(crate) bindings: &'a [MaterialBindings],
-    /// Where its beginning and its end are noted.
+    /// Queries that take the times of its beginning and its end.
     pub(crate) clock: Option<&'a wgpu::QuerySet>,
 }
 
-/// How a picture joins the sums before it.
+/// Weights with which a picture joins the sums before it.
 #[derive(Clone, Copy)]
 pub(crate) struct Weights {
     /// Part of the sums that stays.
@@ -119,8 +119,8 @@ impl Renderer {
     /// Records a frame, one sample of shading a pixel, into the caller's commands: nothing is submitted, and
     /// nothing waited for.
     ///
-    /// What is recorded is the scene as it is now. Materials whose BRDF, colours and environment are those of
-    /// the last frame take nothing from the processor but the look at them.
+    /// The frame shows the scene as it is now. Materials whose BRDF, colours and environment are those of the
+    /// last frame cost the processor nothing but the comparison.
     ///
     /// # Errors
     /// [`GpuError`] for a shader that does not hold together, or textures that the device cannot hold.
@@ -148,8 +148,8 @@ impl Renderer {
         self.pass(encoder, shown, &Pass { target, view, bindings: &bindings, clock: None })
     }
 
-    /// Draws a picture; [`Canvas::read`] has it. Waits for the picture before, so that no queue grows without
-    /// end.
+    /// Draws a picture, for [`Canvas::read`] to read. It waits for the picture before, so that no queue grows
+    /// without end.
     ///
     /// # Errors
     /// [`GpuError`].
@@ -182,8 +182,8 @@ impl Renderer {
         Ok(())
     }
 
-    /// Draws a frame as an application would, and says how many milliseconds it took: by the device's own
-    /// clock where it has one, else by ours from asking to being done.
+    /// Draws a frame as an application would, and returns the milliseconds that it took: by the device's own
+    /// clock where it has one, else by ours, from the call until the frame is done.
     ///
     /// # Errors
     /// [`GpuError`].
@@ -258,12 +258,13 @@ impl Renderer {
                 environment: (scene.environment.as_ref())
                     .map(|e| Surrounding(Arc::clone(&e.filtered), e.technique)),
             };
-            let mut bound = textures.bound.lock().unwrap_or_else(PoisonError::into_inner);
-            if let Some((_, group)) = bound.as_ref().filter(|(last, _)| *last == key) {
+            let bound = || textures.bound.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some((_, group)) = bound().as_ref().filter(|(last, _)| *last == key) {
                 return Ok(MaterialBindings { pipeline, group: group.clone() });
             }
+            // Made without the lock: what the material makes of an environment is worked out by all threads.
             let group = self.material_group(scene, (material, textures), &maps.method, &key)?;
-            *bound = Some((key, group.clone()));
+            *bound() = Some((key, group.clone()));
             Ok(MaterialBindings { pipeline, group })
         };
         scene.materials.iter().zip(&maps.materials).map(one).collect()
@@ -295,7 +296,7 @@ impl Renderer {
         }))
     }
 
-    /// The sampler of a kind, made once.
+    /// Sampler of a kind, made once.
     fn sampler(&self, key: SamplerKey) -> wgpu::Sampler {
         let mut made = self.samplers.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, sampler)) = made.iter().find(|(of, _)| *of == key) {
@@ -306,7 +307,7 @@ impl Renderer {
         sampler
     }
 
-    /// Depths for a target without; made anew when its size changes.
+    /// Depths for a target without its own; made anew when its size changes.
     fn own_depth(&self, size: Size, samples: u32) -> wgpu::TextureView {
         let mut last = self.depth.lock().unwrap_or_else(PoisonError::into_inner);
         let fits = |view: &&wgpu::TextureView| {
@@ -350,7 +351,7 @@ impl Renderer {
         self.device.upload(bytes, wgpu::BufferUsages::UNIFORM)
     }
 
-    /// Group 0 of a pass; the mask is read only where it is not being made.
+    /// Group 0 of a pass; a pass that makes the mask does not read it.
     fn scene_group(
         &self,
         shown: &SceneView<'_>,
@@ -397,7 +398,7 @@ impl Renderer {
         self.pass_masked(encoder, shown, pass, &self.no_mask)
     }
 
-    /// Draws all triangles; where the view is masked, only where the mask says so.
+    /// Draws all triangles; in a masked view, only where the mask is set.
     fn pass_masked(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -472,7 +473,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Adds the picture on the canvas to its sums, of which the first part is kept.
+    /// Adds the picture on the canvas to its sums, by these weights.
     pub(crate) fn add(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -528,7 +529,7 @@ fn encode(
     draw(&mut pass);
 }
 
-/// A texture of one level and layer, as it is bound.
+/// View of a new texture of one level and layer.
 fn texture(
     device: &Device,
     size: Size,

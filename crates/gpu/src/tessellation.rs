@@ -1,7 +1,7 @@
-//! Meshes with relief on the GPU: cut anew for each picture, their points and triangles worked out by compute
-//! passes.
+//! Meshes with relief on the GPU: cut anew for each picture, by compute passes that work out their points and
+//! triangles.
 //!
-//! A picture costs a plan on the CPU, a pass over the base mesh; what is in memory is bounded by that mesh
+//! A picture costs a plan on the CPU, a pass over the base mesh. The memory in use is bounded by that mesh
 //! and the picture's pixels, not by the map.
 
 use bytemuck::{Pod, Zeroable};
@@ -15,7 +15,7 @@ use ndfmap_scene::{Camera, Displacement, Object, Scene};
 use crate::geometry::{Corner, Geometry, Part, Triangle, corner, triangle};
 use crate::{Device, GpuError};
 
-/// What both passes share.
+/// Common part of both passes.
 const HEIGHTS: &str =
     concat!(include_str!("passes/vertices.wgsl"), "\n", include_str!("passes/heights.wgsl"));
 
@@ -40,7 +40,7 @@ struct Cut {
 
 /// A mesh, as it is before it is cut.
 enum Base {
-    /// One without relief: what is drawn.
+    /// Mesh without relief, ready to be drawn.
     Plain {
         vertices: Vec<Corner>,
         corners: Vec<u32>,
@@ -53,7 +53,7 @@ enum Base {
     },
 }
 
-/// The meshes of a scene in the GPU's memory, to be cut for any picture.
+/// Meshes of a scene in the GPU's memory, to be cut for any picture.
 pub struct Meshes<'a> {
     device: Device,
     scene: &'a Scene,
@@ -65,7 +65,7 @@ pub struct Meshes<'a> {
 }
 
 impl<'a> Meshes<'a> {
-    /// Uploads the meshes and the heights of what has relief.
+    /// Uploads the meshes, and the heights of those with relief.
     ///
     /// # Errors
     /// [`GpuError`] for a scene larger than the device's buffers.
@@ -103,7 +103,7 @@ impl<'a> Meshes<'a> {
         })
     }
 
-    /// Cuts what has relief for a picture of this size.
+    /// Cuts the meshes with relief for a picture of this size.
     ///
     /// # Errors
     /// [`GpuError`] for more triangles than the device's buffers hold.
@@ -185,7 +185,7 @@ impl<'a> Meshes<'a> {
     }
 }
 
-/// What does not change from picture to picture, and the plan's numbers.
+/// Cut with the values that do not change from picture to picture, and with the plan's numbers.
 fn of_displaced(displacement: &Displacement, plan: &Plan, (first_point, first_triangle): (u32, u32)) -> Cut {
     let (finest, wraps) = (displacement.heights_size(), displacement.heights.wraps());
     let bit = |wrap: Wrap, bit: u32| if wrap == Wrap::Repeat { bit } else { 0 };

@@ -1,9 +1,7 @@
-//! The truth by the GPU: many pictures of the map as it is, each seen from a little elsewhere in the pixel,
-//! added up.
+//! The truth by the GPU: a sum of many pictures of the map as it is, each through another place in the pixel.
 //!
-//! It tends to what the CPU renderer's truth tends to. Where a sample falls in a pixel is the same for all
-//! pixels of a picture, stratified over 4 × 4 squares; which of the nearest texels it shades is each pixel's
-//! own chance.
+//! The truth has the same limit as the CPU renderer's. A sample falls on the same place in all pixels of a
+//! picture, stratified over 4 × 4 squares; each pixel draws by chance which of the nearest texels it shades.
 
 use glam::{DVec2, DVec3};
 use ndfmap_core::grid::Grid;
@@ -24,13 +22,13 @@ const STRATA: usize = 4;
 /// the noise.
 pub const LEAST_SAMPLES: usize = 2 * STRATA * STRATA;
 
-/// The finest level of a scene's maps, for the truth.
+/// Finest level of a scene's maps, for the truth.
 pub struct FinestMaps {
     materials: Vec<Textures>,
 }
 
 impl FinestMaps {
-    /// Uploads them.
+    /// Uploads the maps.
     ///
     /// # Errors
     /// [`GpuError`] for maps that the device cannot hold.
@@ -40,12 +38,12 @@ impl FinestMaps {
     }
 }
 
-/// A frame to be drawn by brute force: a scene, and its maps as they are.
+/// Frame to be drawn by brute force: a scene, and its maps as they are.
 #[derive(Clone, Copy)]
 pub struct TrueFrame<'a> {
     /// The scene.
     pub view: SceneView<'a>,
-    /// The finest level of its maps, uploaded to the renderer's device.
+    /// Finest level of its maps, uploaded to the renderer's device.
     pub finest: &'a FinestMaps,
 }
 
@@ -54,7 +52,7 @@ impl Renderer {
     /// difference.
     ///
     /// # Errors
-    /// [`GpuError`], and where the observer wants no more.
+    /// [`GpuError`], also where the observer cancels.
     ///
     /// # Panics
     /// When the canvas smooths outlines by itself: the truth does that with its samples.
@@ -72,8 +70,8 @@ impl Renderer {
         let mut halves = [vec![DVec3::ZERO; canvas.size.area()], vec![DVec3::ZERO; canvas.size.area()]];
         let mut done = 0;
         loop {
-            // Doubling where a noise is asked for, so that looking at it costs little; and never so much at
-            // once that single floats lose what is added.
+            // Rounds double where a noise is asked for, so that measuring it costs little. They are never so
+            // many at once that single floats lose what is added.
             let wanted = if effort.noise > 0.0 { done.max(1) } else { rounds };
             let more = wanted.min(rounds - done).min(MOST_ROUNDS);
             for (half, sums) in halves.iter_mut().enumerate() {
@@ -91,7 +89,7 @@ impl Renderer {
                         self.add(&mut encoder, canvas, weights, false);
                     }
                     canvas.device.submit(encoder);
-                    // A queue without end would be memory without end.
+                    // An endless queue would take endless memory.
                     canvas.device.wait()?;
                     let part = (half * more + round + 1 - done) as f64 / 2.0;
                     observer.progress((done as f64 + part) / rounds as f64);
@@ -116,10 +114,10 @@ impl Renderer {
     }
 }
 
-/// Rounds of strata that are added up in single floats.
+/// Most rounds of strata that single floats add up.
 const MOST_ROUNDS: usize = 64;
 
-/// What is seen through a stratum of every pixel, somewhere in it.
+/// View through a random place in a stratum of every pixel.
 fn jittered(shown: &SceneView<'_>, canvas: &Canvas, stratum: usize, number: u32) -> View {
     let [u, v] = [0, 1].map(|axis| f64::from(scramble(number.wrapping_mul(2) + axis)) / f64::from(u32::MAX));
     let corner = DVec2::new((stratum % STRATA) as f64, (stratum / STRATA) as f64);
@@ -128,7 +126,7 @@ fn jittered(shown: &SceneView<'_>, canvas: &Canvas, stratum: usize, number: u32)
     View { seed: scramble(number), ..View::new(&camera, canvas.size, shown.geometry) }
 }
 
-/// A number that is as good as random (the finaliser of MurmurHash3, Appleby 2011, of a counter).
+/// Pseudorandom number (the finaliser of MurmurHash3, Appleby 2011, of a counter).
 fn scramble(counter: u32) -> u32 {
     let mut z = counter.wrapping_add(1).wrapping_mul(0x9e37_79b9);
     z = (z ^ (z >> 16)).wrapping_mul(0x85eb_ca6b);

@@ -1,4 +1,4 @@
-//! Numbers as shaders take them: twins in memory of the structures in `passes/`.
+//! Uniforms of the shaders: twins in memory of the structures in `passes/`.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Mat4, Vec3, Vec4};
@@ -33,7 +33,7 @@ pub(crate) struct View {
 }
 
 impl View {
-    /// What a camera sees, a pixel at a time.
+    /// View of a camera, shaded one whole pixel at a time.
     pub(crate) fn new(camera: &Camera, size: Size, geometry: &Geometry) -> Self {
         let rays = camera.rays(size);
         let forward = rays.right.cross(rays.down).normalize_or(DVec3::NEG_Z);
@@ -45,8 +45,7 @@ impl View {
             step * (2.0 / (pixels as f64 * square)) + forward * (2.0 * middle / pixels as f64 - 1.0)
         };
         let (x, y) = (axis(rays.right, size.width), -axis(rays.down, size.height));
-        // Nothing is nearer than this; beyond it depths go on for ever. Floats have the same digits for it as
-        // for any other.
+        // The near plane; there is no far one. Floats have as many digits for this distance as for any other.
         let near = 1e-9 * (geometry.radius + geometry.middle.distance(rays.eye));
         let column = |k: usize| Vec4::new(x[k] as f32, y[k] as f32, 0.0, forward[k] as f32);
         Self {
@@ -66,7 +65,7 @@ impl View {
         }
     }
 
-    /// The same on a target of this format, with a filter.
+    /// Returns it for a target of this format, with a filter.
     pub(crate) fn on(self, format: wgpu::TextureFormat, sampling: Sampling) -> Self {
         let half = format == wgpu::TextureFormat::Rgba16Float;
         let brightest = if half { half::f16::MAX.to_f32() } else { f32::MAX };
@@ -86,14 +85,14 @@ pub(crate) struct LightUniform {
 }
 
 impl LightUniform {
-    /// A small bright source of an environment.
+    /// Uniform of a small bright source of an environment.
     pub(crate) fn of_environment(light: &Light) -> Self {
         let mut uniform = Self::new(light, DVec3::ZERO);
         uniform.power.w = 1.0;
         uniform
     }
 
-    /// A light; places are relative to `middle`.
+    /// Uniform of a light; places are relative to `middle`.
     pub(crate) fn new(light: &Light, middle: DVec3) -> Self {
         match *light {
             Light::Directional { towards, irradiance } => {

@@ -45,7 +45,7 @@ impl AtomicFile {
             return Err(MapError::invalid(target, format!("there is no folder {}", folder.display())));
         }
         let mut builder = tempfile::Builder::new();
-        // Readable as any new file is; the crate's default is for secrets.
+        // The file is as readable as any new file; the crate's default is for secrets.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
         let made = builder.prefix(".ndfmap-").tempfile_in(folder).map_err(|e| MapError::io(target, e))?;
@@ -65,7 +65,7 @@ impl AtomicFile {
         &self.target
     }
 
-    /// Gives the file its final name, replacing what had it.
+    /// Gives the file its final name; replaces a file of that name.
     ///
     /// # Errors
     /// [`MapError`] when the rename fails; the temporary file is removed.
@@ -96,7 +96,7 @@ pub fn write(target: &Path, bytes: &[u8]) -> Result<(), MapError> {
 /// Removes every file that is still being written. For an interrupt handler, just before the end.
 pub fn abandon_all() {
     for path in unfinished().drain(..) {
-        // Finished or dropped meanwhile: nothing to remove, and nobody left to tell.
+        // A file finished or dropped meanwhile is not there to remove, and nobody is left to tell.
         let _gone = std::fs::remove_file(path);
     }
 }

@@ -8,21 +8,21 @@ use ndfmap_core::grid::{Grid, Size};
 use crate::formats::{read_file, read_image};
 use crate::{Attribute, Image, MapError};
 
-/// How an attribute's values are to be taken.
+/// Transfer function of an attribute's values in its file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Transfer {
-    /// As they are.
+    /// Values as they are.
     #[default]
     Linear,
-    /// As sRGB, whose first three channels are decoded: colours mix only when linear.
+    /// sRGB, whose first three channels are decoded: colours mix only when linear.
     Srgb,
 }
 
 /// An attribute and its values, `(0, 0, 0, 1)` where a channel is missing.
 pub struct AttributeMap {
-    /// What it is, for headers.
+    /// Description of the attribute, for headers.
     pub attribute: Attribute,
-    /// One value a fine texel.
+    /// Values, one a fine texel.
     pub values: Grid<[f32; 4]>,
 }
 

@@ -10,7 +10,7 @@ use crate::formats::{read_file, read_image};
 use crate::source::BUILTIN_PREFIX;
 use crate::{Image, MapError, Samples};
 
-/// Where the faces +x, -x, +y, -y, +z, -z are in a picture, in sides of a face, and whether the last is
+/// Places of the faces +x, -x, +y, -y, +z, -z in a picture, in sides of a face, and whether the last is
 /// upside down.
 struct Layout {
     /// Sides across and down.
@@ -27,7 +27,7 @@ const LAYOUTS: [Layout; 4] = [
     Layout { sides: (1, 6), faces: [(0, 0), (0, 1), (0, 2), (0, 3), (0, 4), (0, 5)], last_turned: false },
 ];
 
-/// Reads an environment, `builtin:NAME` or a file; with it, what was odd but could be lived with.
+/// Reads an environment, `builtin:NAME` or a file; returns it with warnings of oddities that do no harm.
 ///
 /// # Errors
 /// [`MapError`] for a file that cannot be read, that is of integers (which hold no radiance), or whose sides
@@ -75,7 +75,7 @@ pub fn parse_environment(path: &Path, bytes: &[u8]) -> Result<(Environment, Vec<
     Ok((environment, warnings))
 }
 
-/// The radiance of a picture; what is none is black, and counted.
+/// Radiance of a picture; samples that are negative or not finite become black, and are counted.
 fn radiance(path: &Path, image: &Image) -> Result<(Vec<String>, Grid<Vec3>), MapError> {
     let Samples::F32(samples) = &image.samples else {
         return Err(MapError::unsupported(
@@ -110,14 +110,14 @@ fn radiance(path: &Path, image: &Image) -> Result<(Vec<String>, Grid<Vec3>), Map
     Ok((warnings, picture))
 }
 
-/// Points over a texel, on each axis, whose mean it is.
+/// Sample points of a texel on each axis; the texel is their mean.
 const POINTS: usize = 3;
 
-/// A cube's picture by latitude and longitude: as many texels around as four faces have.
+/// Picture of a cube by latitude and longitude, as many texels around as four faces have.
 fn unfold(picture: &Grid<Vec3>, layout: &Layout) -> Grid<Vec3> {
     let side = picture.size().width / layout.sides.0;
     let size = Size { width: 4 * side, height: 2 * side };
-    // The directions of texels are the environment's business.
+    // The environment knows the directions of texels.
     let blank = Environment::new(Grid::from_fn(size, |_, _| Vec3::ZERO))
         .unwrap_or_else(|_| unreachable!("black is radiance"));
     let look = |w: DVec3| {
@@ -137,7 +137,7 @@ fn unfold(picture: &Grid<Vec3>, layout: &Layout) -> Grid<Vec3> {
     })
 }
 
-/// The face that a direction goes through, and where on it.
+/// Face that a direction goes through, and the place on it.
 fn face_of(w: DVec3) -> (usize, DVec2) {
     let hit = |face: usize| {
         let axis = cube_direction(face, 0.0, 0.0);
@@ -157,7 +157,7 @@ mod tests {
 
     #[test]
     fn cubes_unfold_in_every_layout() {
-        // Each face of a colour of its own: what is ahead on +x must be +x's.
+        // Each face has its own colour: straight ahead, along +x, must be the colour of face +x.
         let colour = |face: usize| Vec3::new(face as f32 + 1.0, 0.5, 0.0);
         for layout in &LAYOUTS {
             let side = 8;

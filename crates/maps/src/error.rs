@@ -1,4 +1,4 @@
-//! What can go wrong with a file, always with its name.
+//! Errors of files, always with the file's name.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MapError {
-    /// The operating system said no.
+    /// The operating system refused.
     #[error("{}: {source}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What it said.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// The file is damaged, or not what its name says.
@@ -20,7 +20,7 @@ pub enum MapError {
     Invalid {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Damage, in words.
         reason: String,
     },
     /// The file is sound, but of a kind that cannot be used here.
@@ -28,7 +28,7 @@ pub enum MapError {
     Unsupported {
         /// The file.
         path: PathBuf,
-        /// What is not supported, and what is.
+        /// Kind that is not supported, and kinds that are.
         reason: String,
     },
 }

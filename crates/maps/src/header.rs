@@ -7,60 +7,60 @@ use serde::{Deserialize, Serialize};
 
 use crate::MapError;
 
-/// The version of the header that this code writes, and the highest it reads.
+/// Version of the header that this code writes, and the highest it reads.
 pub const VERSION: u32 = 1;
 
-/// What a normal distribution map is.
+/// Description of a normal distribution map, stored in its file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// Version of this header.
     pub version: u32,
-    /// The method's spelling.
+    /// Spelling of the method.
     pub method: String,
     /// Texels in a row of level 0.
     pub width: usize,
     /// Rows of level 0.
     pub height: usize,
-    /// `repeat` or `clamp`, along rows and along columns.
+    /// Wraps along rows and along columns: `repeat` or `clamp`.
     pub wrap: [String; 2],
-    /// What the channels are, such as `sums` or `sums-about-pole`.
+    /// Encoding of the channels, such as `sums` or `sums-about-pole`.
     pub encoding: String,
-    /// What each lobe carries besides its normals, layer after layer behind the lobes' own; none for linear
-    /// methods.
+    /// Attributes that each lobe carries, layer after layer behind the lobes' own; empty for linear methods.
     pub attributes: Vec<Attribute>,
-    /// What it was baked from.
+    /// Source that the map was baked from.
     pub source: Source,
 }
 
-/// A map whose values each lobe carries, times its weight.
+/// Attribute: a map whose values each lobe carries, times its weight.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Attribute {
     /// File name without folders.
     pub name: String,
-    /// Channels that mean something, 1 to 4; the others are those of `(0, 0, 0, 1)`.
+    /// Channels in use, 1 to 4; the others are those of `(0, 0, 0, 1)`.
     pub channels: usize,
-    /// `linear`, or `srgb` when the file's values were decoded from sRGB. The map's own are always linear.
+    /// Transfer of the file: `linear`, or `srgb` when its values were decoded from sRGB. The map's own are
+    /// always linear.
     pub transfer: String,
 }
 
-/// What a map was baked from.
+/// Source that a map was baked from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Source {
     /// File name without folders, or `builtin:NAME`.
     pub file: String,
-    /// Normals or heights.
+    /// Kind of the source: normals or heights.
     pub kind: SourceKind,
     /// SHA-256 of the file, in hexadecimal; empty for built-in maps.
     pub sha256: String,
     /// Texture widths per unit of height, for heights.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub height_scale: Option<f64>,
-    /// `opengl` or `directx`, for normals: which way the file's green pointed. The map is always y up.
+    /// Direction of the file's green, for normals: `opengl` or `directx`. The map is always y up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub convention: Option<String>,
 }
 
-/// Whether a source holds normals or heights.
+/// Kind of a source: normals or heights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SourceKind {
@@ -80,7 +80,7 @@ impl Header {
         })
     }
 
-    /// The [`Wraps`] that are spelled.
+    /// [`Wraps`] that the header spells.
     ///
     /// # Errors
     /// [`MapError`] for any other word.
@@ -93,7 +93,7 @@ impl Header {
         Ok(Wraps { x: wrap(&self.wrap[0])?, y: wrap(&self.wrap[1])? })
     }
 
-    /// The JSON text.
+    /// JSON text of the header.
     #[must_use]
     pub fn to_json(&self) -> String {
         serde_json::to_string(self).unwrap_or_else(|e| unreachable!("a header has string keys only: {e}"))
@@ -102,7 +102,7 @@ impl Header {
     /// Reads the JSON text.
     ///
     /// # Errors
-    /// [`MapError`] when it is no header, or a newer one.
+    /// [`MapError`] when the text is no header, or a newer one.
     pub fn from_json(path: &Path, text: &str) -> Result<Self, MapError> {
         let header: Self = serde_json::from_str(text)
             .map_err(|e| MapError::invalid(path, format!("its `ndfmap` key cannot be read: {e}")))?;

@@ -6,10 +6,10 @@ use ndfmap_core::grid::Size;
 
 use crate::MapError;
 
-/// Longest side that is read. Headers beyond it are refused before anything is allocated.
+/// Longest side that readers take. Headers beyond it are refused before anything is allocated.
 pub const MAX_SIDE: usize = 32_768;
 
-/// Most texels that are read: 16384 × 16384.
+/// Most texels that readers take: 16384 × 16384.
 pub const MAX_TEXELS: usize = 1 << 28;
 
 /// Samples of all texels, channels interleaved, rows from the top.
@@ -44,7 +44,7 @@ impl Samples {
         }
     }
 
-    /// True when there is none.
+    /// True when there are no samples.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -60,7 +60,7 @@ pub struct Image {
     pub channels: usize,
     /// All samples.
     pub samples: Samples,
-    /// What the reader found odd but could live with.
+    /// Warnings of the reader: oddities that do no harm.
     pub warnings: Vec<String>,
 }
 

@@ -1,8 +1,8 @@
-//! ndfmap-maps: files in and out, and what their channels mean.
+//! ndfmap-maps: files in and out, and the meaning of their channels.
 //!
 //! Two things come out of files. A **source** ([`source`]) is a picture read as a surface: a normal map
 //! or a height map, in any of the formats of [`formats::TABLE`]. A **normal distribution map**
-//! ([`NdfMap`]) is what a bake makes: a stored pyramid and a [`Header`] that says what it holds.
+//! ([`NdfMap`]) is the product of a bake: a stored pyramid and a [`Header`] that describes it.
 
 pub mod atomic;
 pub mod attribute;

@@ -2,8 +2,8 @@
 //!
 //! Three 32-bit counts, 90 × 90 × 180, then as many 64-bit floats for red, for green and for blue, all
 //! little-endian. Bins of the half angle (finer towards the peak), of the difference angle, and of the turn
-//! of the difference, the last the fastest. Values are to be scaled by a number for each channel; those that
-//! are negative were never measured.
+//! of the difference, the last the fastest. Each channel has a factor that scales its values; negative values
+//! were never measured.
 
 use std::path::Path;
 
@@ -21,15 +21,16 @@ const VALUES: usize = BINS * BINS * TURNS;
 const HEADER: usize = 12;
 const SIZE: usize = HEADER + 3 * 8 * VALUES;
 
-/// What a stored value is times, channel by channel.
+/// Factors of stored values, one a channel.
 const SCALES: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
 
-/// Reads and factors a file. The number is of values that are negative or no number, over all channels.
+/// Reads and factors a file; also returns the number of values, over all channels, that are negative or not
+/// finite.
 ///
 /// # Errors
 /// [`MapError`] for a file that cannot be read, or is no such table.
 pub fn read_merl(path: &Path) -> Result<(Measured, usize), MapError> {
-    // The one size there is, looked at before so many bytes are read.
+    // The format has one size, checked before so many bytes are read.
     let length = std::fs::metadata(path).map_err(|e| MapError::io(path, e))?.len();
     if length > SIZE as u64 {
         return Err(MapError::invalid(path, format!("has {length} bytes; a MERL table has {SIZE}")));
@@ -40,7 +41,7 @@ pub fn read_merl(path: &Path) -> Result<(Measured, usize), MapError> {
 /// [`read_merl`] of a file's bytes.
 ///
 /// # Errors
-/// [`MapError`] for what is no such table.
+/// [`MapError`] for bytes that are no such table.
 pub fn parse_merl(path: &Path, bytes: &[u8]) -> Result<(Measured, usize), MapError> {
     let Some((header, values)) = bytes.split_first_chunk::<HEADER>() else {
         return Err(MapError::invalid(

@@ -15,9 +15,9 @@ use crate::{Header, MapError};
 /// A normal distribution map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NdfMap {
-    /// What it is.
+    /// Header: method, size, encoding and source.
     pub header: Header,
-    /// Its levels.
+    /// Pyramid of the levels.
     pub pyramid: Pyramid,
 }
 
@@ -43,21 +43,21 @@ impl NdfMap {
         }
     }
 
-    /// The method that decodes it.
+    /// Method that decodes the map.
     ///
     /// # Errors
-    /// [`MapError`] when the header names none; `path` is for its words.
+    /// [`MapError`] when the header names no method; `path` is for the message.
     pub fn method(&self, path: &Path) -> Result<AnyMethod, MapError> {
         method_of(path, &self.header)
     }
 
-    /// The map as another method reads it: `slopes:9` what `slopes` has baked, `naive` what `toksvig` has,
-    /// `sh:4` what `sh:7` has. Lobes stay as they were fitted, whatever alignment the method would have asked
-    /// for.
+    /// Returns the map as another method reads it: `slopes:9` reads bakes of `slopes`, `naive` those of
+    /// `toksvig`, `sh:4` those of `sh:7`. Lobes stay as they were fitted, whatever alignment the method would
+    /// have asked for.
     ///
     /// # Errors
-    /// [`MapError`] for a method that reads other channels, and for a header that names none; `path` is for
-    /// its words.
+    /// [`MapError`] for a method that reads other channels, and for a header that names no method; `path` is
+    /// for the message.
     pub fn read_by(&self, path: &Path, method: &dyn Method) -> Result<Self, MapError> {
         let own = self.method(path)?;
         if !method.reads(&own.encoding()) {
@@ -80,7 +80,7 @@ impl NdfMap {
         Some(NdfTexel { method, channels: self.pyramid.texel(level, x, y) })
     }
 
-    /// What a pixel sees: the texels that it falls on, filtered; `None` where the header names no method.
+    /// Texel that a pixel sees, filtered over its footprint; `None` where the header names no method.
     #[must_use]
     pub fn filtered(&self, pixel: &PixelFootprint, filtering: Filtering) -> Option<NdfTexel> {
         let method: AnyMethod = self.header.method.parse().ok()?;
@@ -117,20 +117,20 @@ impl NdfTexel {
         &self.channels[..4 * self.method.layers()]
     }
 
-    /// The distribution of normals that it stands for.
+    /// Distribution of normals that the texel stands for.
     #[must_use]
     pub fn decoded(&self) -> Decoded {
         self.method.describe(self.own())
     }
 
-    /// Value of an attribute that a lobe carries; `None` where there is none.
+    /// Value of an attribute that a lobe carries; `None` without such an attribute or lobe.
     #[must_use]
     pub fn attribute(&self, attribute: usize, lobe: usize) -> Option<[f32; 4]> {
         self.method.lobe_layout()?.attribute(&self.channels, attribute, lobe)
     }
 
-    /// Light that it sends to the eye, linear RGB: every normal of it lit by every light. The material is all
-    /// of one colour and roughness.
+    /// Light that the texel sends to the eye, linear RGB: every light on every normal. The material has one
+    /// colour and roughness everywhere.
     #[must_use]
     pub fn shade(&self, brdf: &Brdf, params: &SurfaceParams, lights: &[IncidentLight]) -> DVec3 {
         let texel = FilteredTexel {

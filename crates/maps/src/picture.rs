@@ -13,14 +13,14 @@ use crate::{MapError, atomic};
 /// Formats that pictures are written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PictureFormat {
-    /// 8-bit sRGB of what is shown.
+    /// Display values in 8-bit sRGB.
     Png,
     /// 32-bit floats of linear RGB.
     Exr,
 }
 
 impl PictureFormat {
-    /// The format that a file's name asks for; `None` for one that is not written.
+    /// Format that a file's name asks for; `None` for one that is not written.
     #[must_use]
     pub fn of(path: &Path) -> Option<Self> {
         match path.extension()?.to_string_lossy().to_lowercase().as_str() {
@@ -42,7 +42,7 @@ pub fn to_bytes(picture: &Picture, exposure: f32) -> Grid<[u8; 3]> {
 /// An 8-bit RGB picture as a PNG file in memory.
 ///
 /// # Errors
-/// What the encoder met, as text.
+/// Failure of the encoder, as text.
 pub fn png_bytes(pixels: &[[u8; 3]], size: Size) -> Result<Vec<u8>, String> {
     let encode = || {
         let mut bytes = Vec::new();

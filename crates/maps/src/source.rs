@@ -16,7 +16,7 @@ use crate::formats::{read_file, read_image};
 use crate::header::{Source, SourceKind};
 use crate::{Image, MapError, Samples};
 
-/// Which way green points in a normal map.
+/// Direction of green in a normal map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Convention {
     /// Up the picture.
@@ -27,7 +27,7 @@ pub enum Convention {
 }
 
 impl Convention {
-    /// As spelled on the command line and in headers.
+    /// Spelling on the command line and in headers.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -37,27 +37,27 @@ impl Convention {
     }
 }
 
-/// How to take a picture.
+/// Options for reading a picture as a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SourceOptions {
-    /// Normals or heights; `None` decides by the picture: grey ones are heights.
+    /// Kind of the map, normals or heights; `None` decides by the picture: grey ones are heights.
     pub kind: Option<SourceKind>,
-    /// For normal maps.
+    /// Direction of green, for normal maps.
     pub convention: Convention,
-    /// For height maps: texture widths that one unit of height stands for (full white of an integer
-    /// picture is one unit).
+    /// Texture widths that one unit of height stands for, for height maps (full white of an integer picture
+    /// is one unit).
     pub height_scale: f64,
-    /// For height maps: white is deep.
+    /// White is deep, for height maps.
     pub invert: bool,
-    /// For height maps.
+    /// Filter that takes slopes from heights, for height maps.
     pub slope_filter: SlopeFilter,
-    /// What lies beyond the edges.
+    /// Continuation beyond the edges, on each axis.
     pub wraps: Wraps,
     /// Size of a built-in surface.
     pub builtin_size: Size,
 }
 
-/// Height of full white, in texture widths, when nobody says.
+/// Default height of full white, in texture widths.
 pub const DEFAULT_HEIGHT_SCALE: f64 = 0.05;
 
 impl Default for SourceOptions {
@@ -78,23 +78,23 @@ impl Default for SourceOptions {
 pub struct SourceMap {
     /// The finest level.
     pub surface: Arc<dyn Surface>,
-    /// What it is, for headers.
+    /// Description of the source, for headers.
     pub source: Source,
-    /// What was odd about it.
+    /// Warnings of the reader.
     pub warnings: Vec<String>,
 }
 
-/// What built-in surfaces are called: this and a name.
+/// Prefix of the names of built-in surfaces.
 pub const BUILTIN_PREFIX: &str = "builtin:";
 
-/// Heights beyond this many texture widths are no heights: NaN, infinity, or a "no data" that no tag names.
+/// Heights beyond this many texture widths are not real: NaN, infinity, or a "no data" that no tag names.
 const ABSURD_HEIGHT: f32 = 1e6;
 
-/// Heights that span more texture widths than this are surely in other units.
+/// Largest span of heights in texture widths: wider ones are surely in other units.
 const STEEP_SPAN: f32 = 2.0;
 
-/// Below this signed [`integrability`] a map contradicts its convention; at what real maps reach when
-/// nothing can be said (0.22, linen) it must stay silent.
+/// Signed [`integrability`] below which a map contradicts its convention. The check must stay silent at the
+/// values of real maps that tell nothing (0.22, linen).
 const CONTRADICTION: f64 = -0.25;
 
 /// Reads `map`: a file, or `builtin:NAME`.
@@ -142,10 +142,10 @@ fn builtin(map: &Path, name: &str, options: &SourceOptions) -> Result<SourceMap,
     Ok(SourceMap { surface: surface.into(), source, warnings })
 }
 
-/// Takes a decoded picture as a surface.
+/// Reads a decoded picture as a surface.
 ///
 /// # Errors
-/// [`MapError`] when it cannot be what it is said to be.
+/// [`MapError`] for a picture that does not fit the options.
 pub fn source_of_image(
     path: &Path,
     image: Image,
@@ -177,7 +177,7 @@ pub fn source_of_image(
     Ok(SourceMap { surface, source: Source { file, kind, sha256, height_scale, convention }, warnings })
 }
 
-/// True for one channel, or three that never part by more than JPEG's colour noise (8 of 255).
+/// True for one channel, or three that never differ by more than JPEG's colour noise (8 of 255).
 fn is_grey(image: &Image) -> bool {
     if image.channels < 3 {
         return image.channels == 1;
@@ -232,11 +232,11 @@ fn height_field(
 struct EncodedNormals {
     image: Image,
     wraps: Wraps,
-    /// z is rebuilt from x and y.
+    /// True when z is rebuilt from x and y.
     two_channels: bool,
-    /// Stored values run from 0 to 1 and stand for -1 to 1.
+    /// True when stored values run from 0 to 1 and stand for -1 to 1.
     positive: bool,
-    /// 1, or -1 to turn DirectX's green.
+    /// Sign of green: 1, or -1 to turn DirectX's.
     green: f32,
 }
 
@@ -278,7 +278,7 @@ impl EncodedNormals {
         Ok(normals)
     }
 
-    /// Counts what is no normal, and asks whether the convention can be right.
+    /// Counts texels that hold no normal, and checks whether the convention can be right.
     fn check_normals(&self, convention: Convention, warnings: &mut Vec<String>) {
         let mut row = SurfaceRow::flat(self.image.size.width);
         let below: usize = (0..self.image.size.height)
@@ -343,7 +343,7 @@ impl EncodedNormals {
             if self.two_channels {
                 *z = (1.0 - *x * *x - *y * *y).max(0.0).sqrt();
             }
-            // Black, stored as three zeros, is no direction: unsigned it decodes to the corner below.
+            // Black, three zeros, is no direction: unsigned values decode it to the corner below.
             let black = self.positive && !self.two_channels && *x + *y + *z == -3.0;
             let v = if black { Vec3::ZERO } else { Vec3::new(*x, *y * self.green, *z) };
             let n = unit_or_up(v);
@@ -352,7 +352,7 @@ impl EncodedNormals {
     }
 }
 
-/// What a stored 8-bit channel means.
+/// Values that the codes of an 8-bit channel stand for.
 static DECODE_U8: std::sync::LazyLock<[f32; 256]> =
     std::sync::LazyLock::new(|| std::array::from_fn(|c| 2.0 * (c as f32 / 255.0) - 1.0));
 

@@ -1,5 +1,5 @@
-//! Renders a scene or a model through its maps: `cargo run --release -p ndfmap --example render_a_model
-//! [SCENE|MODEL [FILE.png]]`.
+//! Renders a scene or a model through its maps:
+//! `cargo run --release -p ndfmap --features models --example render_a_model [SCENE|MODEL [FILE.png]]`.
 
 use ndfmap::SceneSpec;
 use ndfmap::core::grid::Size;

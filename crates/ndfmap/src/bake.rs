@@ -28,30 +28,30 @@ pub struct BakeJob<'a> {
     observer: &'a dyn Observer,
 }
 
-/// What a bake made; as JSON, what `ndfmap bake --json` prints.
+/// Report of a bake; its JSON form is the output of `ndfmap bake --json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct BakeReport {
-    /// The method's spelling.
+    /// Spelling of the method.
     pub method: String,
     /// Texels in a row of the finest level.
     pub width: usize,
     /// Rows of the finest level.
     pub height: usize,
-    /// Levels.
+    /// Number of levels.
     pub levels: usize,
-    /// RGBA layers, those of attributes among them.
+    /// RGBA layers, including those of attributes.
     pub layers: usize,
     /// Format of the file: `ktx2`, `exr` or `exr-bumpslopes`.
     pub format: String,
-    /// Length of the file.
+    /// Length of the file in bytes.
     pub bytes: u64,
     /// Threads that were at work.
     pub threads: usize,
-    /// Times.
+    /// Times of the parts of the work.
     pub seconds: BakeSeconds,
-    /// What the source's reader warned of.
+    /// Warnings of the source's reader.
     pub warnings: Vec<String>,
-    /// How the method was chosen, where it was.
+    /// Choice of the method, where one was made.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub auto: Option<Choice>,
 }
@@ -59,7 +59,7 @@ pub struct BakeReport {
 /// Seconds that a bake took.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct BakeSeconds {
-    /// Reading the source and the attributes; for who did that to say.
+    /// Reading the source and the attributes; the caller, who did that, fills it in.
     pub read: f64,
     /// Baking, and writing with it where rows go straight into the file.
     pub bake: f64,
@@ -75,25 +75,25 @@ impl<'a> BakeJob<'a> {
         Self { map, method, precision: Precision::Half, attributes: &[], observer: &Unobserved }
     }
 
-    /// The same into channels of this precision.
+    /// Returns it with channels of this precision.
     #[must_use]
     pub fn precision(self, precision: Precision) -> Self {
         Self { precision, ..self }
     }
 
-    /// The same with attributes for the lobes to carry.
+    /// Returns it with attributes for the lobes to carry.
     #[must_use]
     pub fn attributes(self, attributes: &'a [AttributeMap]) -> Self {
         Self { attributes, ..self }
     }
 
-    /// The same for somebody to watch and to stop.
+    /// Returns it with an observer, who may watch and stop it.
     #[must_use]
     pub fn observer(self, observer: &'a dyn Observer) -> Self {
         Self { observer, ..self }
     }
 
-    /// The header of what comes out.
+    /// Header of the baked map.
     #[must_use]
     pub fn header(&self) -> Header {
         let Size { width, height } = self.map.surface.size();
@@ -131,9 +131,14 @@ impl<'a> BakeJob<'a> {
     /// Bakes into memory.
     ///
     /// # Errors
-    /// [`Error::Request`] for attributes that do not fit or channels too large for the precision, and
-    /// [`Error::Cancelled`].
+    /// [`Error::Request`] for attributes that do not fit, [`Error::Map`] for channels too large for the
+    /// precision, and [`Error::Cancelled`].
     pub fn to_map(&self) -> Result<NdfMap, Error> {
+        self.to_map_for(Path::new(&self.map.source.file))
+    }
+
+    /// [`Self::to_map`]; errors name this file.
+    fn to_map_for(&self, file: &Path) -> Result<NdfMap, Error> {
         self.check()?;
         let values: Vec<_> = self.attributes.iter().map(|a| a.values.clone()).collect();
         let bake = Bake::new(&*self.map.surface, &*self.method)
@@ -142,7 +147,7 @@ impl<'a> BakeJob<'a> {
             .observer(self.observer);
         self.observer.begin(&self.method.to_string());
         let (pyramid, report) = bake.to_pyramid()?;
-        refuse_overflow(report, Path::new(&self.map.source.file))?;
+        refuse_overflow(report, file)?;
         Ok(NdfMap { header: self.header(), pyramid })
     }
 
@@ -153,10 +158,21 @@ impl<'a> BakeJob<'a> {
     pub fn save(&self, path: &Path, options: &WriteOptions) -> Result<BakeReport, Error> {
         self.check()?;
         let format = to_write(path)?;
+        let (compressed, bumpslopes) =
+            (options.zstd.is_some(), options.channels == ChannelLayout::Bumpslopes);
+        let exr = format.extensions.contains(&"exr");
+        // Known before the minutes of baking.
+        if bumpslopes && (!exr || self.method.to_string() != "slopes") {
+            let why = "the bumpslopes layout needs an output ending in .exr and `--method slopes`";
+            return Err(Error::Request(why.to_owned()));
+        }
+        if compressed && exr {
+            return Err(Error::Request("Zstandard is for KTX2; an EXR is compressed as it is".to_owned()));
+        }
         let start = Instant::now();
-        let plain = options.zstd.is_none() && options.channels == ChannelLayout::Native;
+        let plain = !compressed && !bumpslopes;
         let (bytes, baked) = match format.open_sink.filter(|_| plain) {
-            // Straight into the file, so that writing counts as baking; what remains is the rename.
+            // Rows go straight into the file, so writing counts as baking; only the rename remains.
             Some(open) => {
                 let values: Vec<_> = self.attributes.iter().map(|a| a.values.clone()).collect();
                 let bake = Bake::new(&*self.map.surface, &*self.method)
@@ -171,22 +187,17 @@ impl<'a> BakeJob<'a> {
                 (sink.finish()?, baked)
             }
             None => {
-                // Bumpslopes of heights change their units, so they are rounded when written, and only then.
-                let bumpslopes = options.channels == ChannelLayout::Bumpslopes;
-                if bumpslopes && !self.method.knows_displacement() {
-                    let why = "the bumpslopes layout needs an output ending in .exr and `--method slopes`";
-                    return Err(Error::Request(why.to_owned()));
-                }
+                // Bumpslopes of heights change their units, so they are rounded only when written.
                 let converts = bumpslopes && self.map.surface.has_height();
                 let job = if converts { self.clone().precision(Precision::Single) } else { self.clone() };
-                let map = job.to_map()?;
+                let map = job.to_map_for(path)?;
                 let baked = start.elapsed().as_secs_f64();
                 let options = WriteOptions { precision: Some(self.precision), ..*options };
                 (map.save(path, &options)?, baked)
             }
         };
         let size = self.map.surface.size();
-        let suffix = if options.channels == ChannelLayout::Native { "" } else { "-bumpslopes" };
+        let suffix = if bumpslopes { "-bumpslopes" } else { "" };
         Ok(BakeReport {
             method: self.method.to_string(),
             width: size.width,

@@ -1,8 +1,8 @@
-//! A choice of method: bakes a map with every candidate, measures each against the truth, and says which one
-//! to take.
+//! Choice of a method: bakes a map with every candidate, measures each against the truth, and says which to
+//! take.
 //!
-//! What is measured is what a viewer meets: the error between texels, where a filter mixes, at levels 3 and
-//! 6, on the map as it would be stored. A candidate's error is the worse of the two levels.
+//! The measure is the error that a viewer meets: between texels, where a filter mixes, at levels 3 and 6, on
+//! the map as it would be stored. A candidate's error is the worse of the two levels.
 
 use ndfmap_core::bake::Bake;
 use ndfmap_core::brdf::Lobe;
@@ -15,7 +15,7 @@ use serde::Serialize;
 use crate::Error;
 use ndfmap_core::ndf::AnyMethod;
 
-/// What may be chosen: one of each kind and size that is the best of its size on some map.
+/// Methods to choose from: one of each kind and size that is the best of its size on some map.
 const CANDIDATES: [&str; 13] = [
     "naive",
     "toksvig",
@@ -35,7 +35,7 @@ const CANDIDATES: [&str; 13] = [
 /// Levels at which candidates are measured; on small maps the coarsest that has neighbours.
 const LEVELS: [usize; 2] = [3, 6];
 
-/// What the choice is bound by.
+/// Bound on the choice.
 #[derive(Clone, Copy, Debug)]
 pub enum Limit {
     /// Largest error.
@@ -44,19 +44,19 @@ pub enum Limit {
     Bytes(usize),
 }
 
-/// A choice to be made.
+/// Choice to be made.
 pub struct Auto<'a> {
     /// The map.
     pub surface: &'a dyn Surface,
-    /// The lobe that errors are measured with.
+    /// Lobe that errors are measured with.
     pub lobe: &'a dyn Lobe,
     /// Bits of a stored channel.
     pub precision: Precision,
-    /// Only methods whose lobes carry attributes.
+    /// Choose only among methods whose lobes carry attributes.
     pub lobes_only: bool,
 }
 
-/// A candidate that was measured.
+/// Candidate, measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Candidate {
     /// Spelling of the method.
@@ -68,7 +68,7 @@ pub struct Candidate {
     pub error: f64,
 }
 
-/// What was chosen, and why.
+/// Choice that was made, with its reason.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choice {
     /// Spelling of the method.
@@ -79,7 +79,7 @@ pub struct Choice {
     /// Lobe that errors were measured with.
     #[serde(rename = "brdf")]
     pub lobe: String,
-    /// Levels at which they were measured.
+    /// Levels at which errors were measured.
     pub levels: Vec<usize>,
     /// Every candidate, those of fewer bytes first.
     pub candidates: Vec<Candidate>,
@@ -129,7 +129,7 @@ impl Auto<'_> {
     }
 }
 
-/// The candidate to take, among those sorted by bytes, and the reason in words.
+/// Picks a candidate among these, sorted by bytes; returns its index, and the reason in words.
 fn pick(candidates: &[Candidate], limit: Limit) -> Result<(usize, String), Error> {
     let least = (0..candidates.len()).min_by(|a, b| candidates[*a].error.total_cmp(&candidates[*b].error));
     match limit {

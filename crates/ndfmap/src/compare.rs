@@ -14,23 +14,23 @@ use ndfmap_core::pyramid::{Precision, Pyramid, level_sizes};
 use ndfmap_core::surface::Surface;
 use serde::{Serialize, Serializer};
 
-/// What is compared.
+/// Subject of a comparison.
 pub struct Subject<'a> {
     /// Name of the map, for the report.
     pub name: &'a str,
     /// The map.
     pub surface: &'a dyn Surface,
-    /// The lobe that its texels are seen through.
+    /// Lobe that its texels are seen through.
     pub lobe: &'a dyn Lobe,
     /// Methods that bake it.
     pub methods: &'a [AnyMethod],
     /// Bits of a stored channel.
     pub precision: Precision,
-    /// Measure between texels too.
+    /// True to measure between texels too.
     pub filtering: bool,
 }
 
-/// Everything that was measured of a map; as JSON, what `ndfmap compare --json` prints.
+/// Comparison of methods on a map; its JSON form is the output of `ndfmap compare --json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// Name of the map.
@@ -44,12 +44,12 @@ pub struct Comparison {
     /// Sizes of the levels, finest first.
     #[serde(skip)]
     pub sizes: Vec<Size>,
-    /// Each method's map and errors; as JSON an object with a key a method.
+    /// Maps and errors, a row a method; as JSON an object with a key a method.
     #[serde(rename = "methods", serialize_with = "by_method")]
     pub rows: Vec<Row>,
 }
 
-/// One method's map and its errors.
+/// Map and errors of one method.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
     /// Spelling of the method.
@@ -112,7 +112,7 @@ pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Compari
     let truth = TexelTruth::new(subject.surface, subject.lobe, &lattice);
     let part = if subject.filtering { 0.5 } else { 1.0 };
     let truths = true_levels(&truth, &observer.part(0.0, part))?;
-    // Level 0 is the map itself, filtered as it has always been.
+    // Level 0 is the map itself, filtered as maps have always been.
     let levels: Vec<usize> = if subject.filtering { (1..sizes.len()).collect() } else { Vec::new() };
     let corners = true_corners(&truth, subject.surface.wraps(), &levels, &observer.part(part, 1.0))?;
     let mut rows = Vec::new();

@@ -1,4 +1,4 @@
-//! Errors of the library: why something was not done.
+//! Errors of the library.
 
 use ndfmap_core::bake::BakeError;
 use ndfmap_core::ndf::ParseMethodError;
@@ -7,11 +7,11 @@ use ndfmap_core::observe::Cancelled;
 use ndfmap_gpu::GpuError;
 use ndfmap_maps::MapError;
 
-/// Why something was not done.
+/// Reason why something was not done.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// What was asked for does not exist, or does not fit what else was asked for.
+    /// The request names things that do not exist, or that do not fit each other.
     #[error("{0}")]
     Request(String),
     /// A file could not be read or written.
@@ -21,7 +21,7 @@ pub enum Error {
     #[cfg(feature = "shaders")]
     #[error(transparent)]
     Gpu(GpuError),
-    /// The observer wanted no more.
+    /// The observer cancelled.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
     /// Something else went wrong.

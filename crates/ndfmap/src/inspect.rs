@@ -42,19 +42,20 @@ pub struct SourceReport {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// What it was read from.
+    /// Source that it was read from.
     pub source: Source,
     /// Length of the mean normal; 1 for a map without relief.
     pub mean_normal_length: f64,
     /// Variance of the slopes along x and along y.
     pub slope_variance: [f64; 2],
-    /// How nearly the normals are those of a surface: 0 for one that is.
+    /// Measure of how well the slopes are the gradient of some height: 1 for a perfect gradient, near 0 when
+    /// nothing can be said, negative when y points the other way.
     pub integrability: f64,
-    /// What its reader warned of.
+    /// Warnings of its reader.
     pub warnings: Vec<String>,
 }
 
-/// One texel of a baked map, decoded.
+/// Texel of a baked map, decoded.
 #[derive(Clone, Debug, Serialize)]
 pub struct TexelReport {
     /// Level, 0 the finest.
@@ -65,18 +66,18 @@ pub struct TexelReport {
     pub y: usize,
     /// Spelling of the method.
     pub method: String,
-    /// The distribution of its normals.
+    /// Distribution of its normals.
     #[serde(flatten)]
     pub decoded: DecodedReport,
 }
 
-/// Distribution of normals, as scripts read it.
+/// Distribution of normals, in a form for scripts.
 #[derive(Clone, Debug, Serialize)]
 #[serde(untagged)]
 pub enum DecodedReport {
     /// A mean normal.
     Mean {
-        /// The mean.
+        /// Mean normal.
         mean: [f64; 3],
     },
     /// A Gaussian in space.
@@ -102,7 +103,7 @@ pub enum DecodedReport {
     },
     /// Lobes.
     Lobes {
-        /// The lobes that are alive.
+        /// Lobes that are alive.
         lobes: Vec<LobeReport>,
     },
     /// Phong peaks.
@@ -112,7 +113,7 @@ pub enum DecodedReport {
     },
 }
 
-/// A lobe, as scripts read it; of its three widths it has the one of its kind.
+/// Lobe, in a form for scripts; of the three widths it has the one of its kind.
 #[derive(Clone, Debug, Serialize)]
 pub struct LobeReport {
     /// Number among the lobes of the texel.
@@ -131,7 +132,7 @@ pub struct LobeReport {
     /// Variance of a planar lobe, on one axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variance: Option<f64>,
-    /// What it carries: the mean of each attribute over its normals, by the attribute's name.
+    /// Attributes that the lobe carries: mean of each over its normals, by the attribute's name.
     #[serde(skip_serializing_if = "Vec::is_empty", serialize_with = "by_name")]
     pub attributes: Vec<CarriedAttribute>,
 }
@@ -141,7 +142,7 @@ pub struct LobeReport {
 pub struct CarriedAttribute {
     /// Name of the attribute.
     pub name: String,
-    /// Its channels.
+    /// Mean of each channel.
     pub mean: Vec<f32>,
 }
 
@@ -150,7 +151,7 @@ fn by_name<S: Serializer>(attributes: &[CarriedAttribute], serializer: S) -> Res
     serializer.collect_map(attributes.iter().map(|a| (&a.name, &a.mean)))
 }
 
-/// `kappa` or exponent of a lobe whose stored form can tell no spread; JSON has no infinity.
+/// Largest `kappa` or exponent, of a lobe whose stored form has no spread; JSON has no infinity.
 const MOST_KAPPA: f64 = 1e6;
 
 /// Describes a baked map.

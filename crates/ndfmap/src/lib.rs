@@ -1,5 +1,5 @@
-//! ndfmap: normal distribution maps from files to pictures, all that the program `ndfmap` does, by typed
-//! functions.
+//! ndfmap: normal distribution maps from files to pictures. Its typed functions do all that the program
+//! `ndfmap` does.
 //!
 //! - [`maps`] reads sources and baked maps; [`BakeJob`] bakes one into the other, and [`choose`] finds the
 //!   method for a map.
@@ -8,7 +8,7 @@
 //! - [`core`] has the mathematics, [`trace`] the CPU renderer, and `gpu` (a feature) the same in real time,
 //!   and shaders for other programs.
 //!
-//! Long work takes an [`Observer`](core::observe::Observer), who is told how far it is and may stop it.
+//! Long work takes an [`Observer`](core::observe::Observer), who is told of its progress and may stop it.
 //!
 //! ```no_run
 //! use ndfmap::BakeJob;

@@ -1,4 +1,4 @@
-//! Pictures of a scene by every method, and how far each is from the truth as a viewer sees it.
+//! Pictures of a scene by every method, and their errors against the truth as a viewer sees them.
 
 use std::time::Instant;
 
@@ -17,7 +17,7 @@ use crate::device::Gpu;
 use crate::device::{Cpu, DeviceReport, Engine, RenderedPicture, TrueGeometry, View};
 use crate::{Error, SceneSpec};
 
-/// What is to be rendered.
+/// Render job: the scene, its frames, and the measures to take.
 pub struct RenderJob<'a> {
     /// The scene.
     pub scene: &'a SceneSpec,
@@ -29,44 +29,44 @@ pub struct RenderJob<'a> {
     pub size: Size,
     /// Bits of a stored channel.
     pub precision: Precision,
-    /// How maps are looked up.
+    /// Look-ups of the maps.
     pub lookups: Lookups,
-    /// Render the truth too.
+    /// Effort of the truth; `None` renders no truth.
     pub truth: Option<Effort>,
-    /// Measure sparkle, in every frame.
+    /// True to measure sparkle, in every frame.
     pub sparkle: bool,
-    /// Keep every frame's pictures, for a contact sheet; a film would fill the memory.
+    /// True to keep every frame's pictures, for a contact sheet; a film would fill the memory.
     pub keep: bool,
 }
 
-/// A frame: what is said of the truth, where asked for, and of each method.
+/// Frame, rendered: measures of the truth, where asked for, and of each method.
 pub struct Frame {
     /// When, 0 to 1.
     pub time: f64,
-    /// What display values are sRGB of: light times this.
+    /// Factor on light, before display values take sRGB of it.
     pub exposure: f32,
     /// The truth, where there is one.
     pub truth: Option<FrameTruth>,
-    /// How the truth changes as the camera drifts, where sparkle is measured.
+    /// Change of the truth as the camera drifts, where sparkle is measured.
     pub drifting: Option<DriftReport>,
     /// Each method's result.
     pub results: Vec<MethodResult>,
-    /// The truth's picture, where there is one, then each method's; none when they are not kept.
+    /// Picture of the truth, where there is one, then of each method; empty when they are not kept.
     pub pictures: Vec<Picture>,
 }
 
-/// What is said of a frame's truth.
+/// Report on a frame's truth.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameTruth {
     /// Rays a pixel.
     pub rays: usize,
-    /// Relative L2 error that it has for want of rays.
+    /// Relative L2 error for want of rays.
     pub noise: f64,
-    /// Seconds that it took.
+    /// Seconds that the truth took.
     pub seconds: f64,
 }
 
-/// What is said of one method's picture.
+/// Report on one method's picture.
 #[derive(Clone, Copy, Debug)]
 pub struct MethodResult {
     /// Milliseconds that the frame took.
@@ -75,12 +75,12 @@ pub struct MethodResult {
     pub errors: Option<PictureErrors>,
 }
 
-/// How far a picture is from the truth.
+/// Errors of a picture against the truth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PictureErrors {
     /// Relative L2 error of the radiance.
     pub relative_l2: f64,
-    /// Mean difference of display values, as Han et al. have it.
+    /// Mean difference of display values, by Han et al.'s definition.
     pub color_error: f64,
     /// Light of the whole picture over the truth's.
     pub brightness: f64,
@@ -92,7 +92,7 @@ pub struct PictureErrors {
     pub sparkle: Option<f64>,
 }
 
-/// Every frame, and what baking took.
+/// Report of a rendering: every frame, and the times of the bakes.
 pub struct RenderReport {
     /// Frames in order.
     pub frames: Vec<Frame>,
@@ -100,11 +100,11 @@ pub struct RenderReport {
     pub methods: Vec<String>,
     /// Seconds that each method's bake took.
     pub bake_seconds: Vec<f64>,
-    /// What rendered.
+    /// Device that rendered.
     pub device: DeviceReport,
 }
 
-/// What is said of a method over all frames; as JSON, what `ndfmap render --json` has for each.
+/// Report on a method over all frames; its JSON form is each method's part of `ndfmap render --json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct MethodReport {
     /// Seconds that the bake took.
@@ -119,7 +119,7 @@ pub struct MethodReport {
     pub frames: Vec<FrameErrors>,
 }
 
-/// Milliseconds of frames.
+/// Statistics of the milliseconds of frames.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FrameTimes {
     /// Median.
@@ -133,14 +133,14 @@ pub struct FrameTimes {
 /// Errors of one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FrameErrors {
-    /// Errors.
+    /// Errors of the picture.
     #[serde(flatten)]
     pub errors: PictureErrors,
     /// When, 0 to 1.
     pub time: f64,
 }
 
-/// What is said of the truths of all frames.
+/// Report on the truths of all frames.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TruthReport {
     /// Most rays a pixel.
@@ -149,12 +149,12 @@ pub struct TruthReport {
     pub noise: f64,
     /// Seconds of all frames.
     pub seconds: f64,
-    /// Drift of most noise, where sparkle was measured.
+    /// Drift with the most noise, where sparkle was measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drift: Option<DriftReport>,
 }
 
-/// What is to render.
+/// Device to render on.
 #[derive(Clone)]
 #[non_exhaustive]
 pub enum Device {
@@ -167,7 +167,7 @@ pub enum Device {
         device: ndfmap_gpu::Device,
         /// Taps of the device's own sampler, in place of ours.
         sampler: Option<u16>,
-        /// Smooth outlines by four samples a pixel, as applications do, in place of 4 × 4 parts.
+        /// True to smooth outlines by four samples a pixel, as applications do, in place of 4 × 4 parts.
         multisample: bool,
     },
 }
@@ -209,6 +209,7 @@ fn render_on<E: Engine>(
     let mut frames = Vec::new();
     let mut scene = first;
     for (at, time) in job.times.iter().enumerate() {
+        observer.check()?;
         if at > 0 && job.scene.moves() {
             scene = job.scene.build(*time, observer)?;
         }
@@ -224,7 +225,7 @@ fn render_on<E: Engine>(
     Ok(RenderReport { frames, methods, bake_seconds, device: engine.describe() })
 }
 
-/// One frame to be rendered.
+/// Frame to be rendered.
 struct Shot<'a, E> {
     engine: &'a E,
     job: &'a RenderJob<'a>,
@@ -246,7 +247,7 @@ impl<E: Engine> Shot<'_, E> {
         };
         let truth = job.truth.map(brute).transpose()?;
         let seconds = start.elapsed().as_secs_f64();
-        // A drifting truth is rendered in one go, which only the CPU renderer knows.
+        // A drifting truth is rendered in one go, which only the CPU renderer can do.
         let drift = |effort: Effort| -> Result<DriftReport, Error> {
             observer.begin("truth, drifting");
             let geometry = TrueGeometry::new(scene, observer);
@@ -256,10 +257,19 @@ impl<E: Engine> Shot<'_, E> {
         let drifting = job.truth.filter(|_| job.sparkle).map(drift).transpose()?;
         let result = |maps: &E::Maps| -> Result<(MethodResult, Picture), Error> {
             observer.begin("filtered");
-            let draw = |view: &View<'_, E::Set>| engine.draw(view, maps, job.lookups, observer);
-            let RenderedPicture { picture, milliseconds } = draw(&view)?;
+            // Every picture of a drift is a part of the same work.
+            let pictures = if drifting.is_some() { 1.0 + DRIFT_FRAMES as f64 } else { 1.0 };
+            let draw = |view: &View<'_, E::Set>, at: usize| {
+                observer.check()?;
+                let part = observer.part(at as f64 / pictures, (at + 1) as f64 / pictures);
+                let drawn = engine.draw(view, maps, job.lookups, &part);
+                part.progress(1.0);
+                drawn
+            };
+            let RenderedPicture { picture, milliseconds } = draw(&view, 0)?;
             let sparkle = |drifting: DriftReport| -> Result<f64, Error> {
-                let moved = |i| draw(&View { camera: drifted(&scene.camera, i), ..view }).map(|d| d.picture);
+                let moved =
+                    |i| draw(&View { camera: drifted(&scene.camera, i), ..view }, 1 + i).map(|d| d.picture);
                 let pictures = (0..DRIFT_FRAMES).map(moved).collect::<Result<Vec<Picture>, _>>()?;
                 Ok(change(&pictures, exposure) / drifting.change.max(f64::MIN_POSITIVE))
             };
@@ -281,12 +291,12 @@ impl<E: Engine> Shot<'_, E> {
     }
 }
 
-/// How much the truth changes over a drift: [`change`] of its display values.
+/// Change of the truth over a drift: [`change`] of its display values.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DriftReport {
     /// Change from a step to the next, of display values.
     pub change: f64,
-    /// How much of that a truth of the same noise would show if nothing moved.
+    /// Part of that change that a truth of the same noise would show if nothing moved.
     pub noise: f64,
 }
 
@@ -304,7 +314,7 @@ fn true_change([a, b]: &[Vec<Picture>; 2], exposure: f32) -> DriftReport {
     DriftReport { change: change(&still, exposure), noise: change(&noisy, exposure) }
 }
 
-/// All light of a picture.
+/// Sum of a picture's light.
 fn light_of(picture: &Picture) -> f64 {
     picture.texels().iter().map(|c| f64::from(c.element_sum())).sum()
 }
@@ -354,7 +364,7 @@ impl RenderReport {
         FrameTimes { median: all[all.len() / 2], min: all[0], max: all[all.len() - 1] }
     }
 
-    /// What is said of each method, by its spelling.
+    /// Report on each method, with its spelling.
     pub fn methods(&self) -> impl Iterator<Item = (&str, MethodReport)> {
         self.methods.iter().enumerate().map(|(at, name)| {
             let error = self.mean_errors(at);
@@ -366,7 +376,7 @@ impl RenderReport {
         })
     }
 
-    /// What is said of the truth, where there is one.
+    /// Report on the truth, where there is one.
     #[must_use]
     pub fn truth(&self) -> Option<TruthReport> {
         let all = || self.frames.iter().filter_map(|f| f.truth);

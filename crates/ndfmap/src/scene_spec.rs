@@ -1,4 +1,4 @@
-//! Specification of a scene: built-in or from a file, with its own camera, lights and lobe or others.
+//! Specification of a scene: built-in or from a file, with its own camera, lights and lobe, or with others.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use ndfmap_scene::{Camera, MaterialMap, Scene, SceneOptions};
 
 use crate::Error;
 
-/// A scene as asked for; what is `None` or empty stays as the scene has it.
+/// Scene as asked for; fields that are `None` or empty leave the scene's own.
 #[derive(Clone, Default)]
 pub struct SceneSpec {
     /// Name of a built-in scene, or a model file.
@@ -35,15 +35,15 @@ pub struct SceneSpec {
     pub diffuse: Option<DVec3>,
     /// Reflectance of the first material at normal incidence, linear RGB.
     pub specular: Option<DVec3>,
-    /// What display values are sRGB of: light times this.
+    /// Factor on light, before display values take sRGB of it.
     pub exposure: Option<f64>,
-    /// Let heights displace meshes.
+    /// Displacement of meshes by heights; `None` for none.
     pub displacement: Option<DisplacementOptions>,
     /// Light from everywhere, in place of the scene's own lights.
     pub environment: Option<RotatingEnvironment>,
 }
 
-/// An environment that turns as time goes.
+/// Environment that turns as time goes on.
 #[derive(Clone)]
 pub struct RotatingEnvironment {
     /// The environment.
@@ -52,21 +52,21 @@ pub struct RotatingEnvironment {
     pub rotation: [f64; 2],
 }
 
-/// How heights displace meshes.
+/// Options of the displacement of meshes by heights.
 #[derive(Clone, Copy, Debug)]
 pub struct DisplacementOptions {
-    /// Times what keeps their slopes.
+    /// Factor on the depth that keeps their slopes.
     pub scale: f64,
-    /// Facets shade each other.
+    /// True where facets shade each other.
     pub shadows: bool,
 }
 
 /// Camera in place of the scene's own.
 #[derive(Clone, Copy, Debug)]
 pub struct CameraSpec {
-    /// Where it is.
+    /// Position of the camera.
     pub eye: DVec3,
-    /// What is in the middle of the picture.
+    /// Point in the middle of the picture.
     pub target: DVec3,
     /// Angle of view in degrees, from the bottom to the top of the picture.
     pub degrees: Option<f64>,
@@ -91,7 +91,7 @@ impl SceneSpec {
         }
     }
 
-    /// The scene at a time from 0 to 1. What a model's reader warns of, the observer is told.
+    /// Builds the scene at a time from 0 to 1. The observer is told of a model reader's warnings.
     ///
     /// # Errors
     /// [`Error::Map`] for a model that cannot be read, and [`Error::Request`] for a displacement that does
@@ -114,7 +114,7 @@ impl SceneSpec {
         if let Some(lobe) = &self.lobe {
             scene.set_brdf(&**lobe);
             if lobe.measured().is_some() {
-                // It has brought its own.
+                // The material has brought its own.
                 self.colour(&mut scene);
             }
         }

@@ -1,5 +1,5 @@
-//! A material's map, baked with one method: what renderers look up. And a baked map as the surface of a
-//! material.
+//! Baked maps: a material's map, baked with one method for renderers to look up, and a baked map as the
+//! surface of a material.
 
 use glam::DVec3;
 
@@ -13,13 +13,13 @@ use ndfmap_core::surface::{Surface, SurfaceRow, Wraps};
 
 use super::Material;
 
-/// What a bake makes of one material. Lights, lobes and models come in when shading.
+/// Baked map of one material. Lights, lobes and models come in when shading.
 pub struct BakedMaterial {
     /// The method's layers, then those of the attributes that its lobes carry.
     pub pyramid: Pyramid,
-    /// How many attributes lobes carry: albedo with roughness, and specular colour.
+    /// Number of attributes that lobes carry: albedo with roughness, and specular colour.
     pub attributes: usize,
-    /// The same as maps of their own, finest level, for methods whose lobes carry none.
+    /// Maps of these attributes, finest level, for methods whose lobes carry none.
     pub params: Vec<Grid<Rgba>>,
 }
 
@@ -47,10 +47,10 @@ impl BakedMaterial {
     }
 }
 
-/// A baked map, taken for a surface: rendered as it is by the method that baked it. Its finest level, where a
-/// texel is one normal, is what the truth sees and what other methods bake.
+/// A baked map, taken for a surface. The method that baked it renders it as it is. The truth sees its finest
+/// level, where a texel is one normal, and other methods bake that level.
 pub struct BakedSurface {
-    /// What it is baked with.
+    /// Method that baked the map.
     pub method: AnyMethod,
     /// The map.
     pub pyramid: Pyramid,
@@ -93,7 +93,7 @@ impl Surface for BakedSurface {
     }
 
     fn has_height(&self) -> bool {
-        // Slopes of a normal map come without.
+        // Slopes of a normal map come without heights.
         let mut row = SurfaceRow::flat(self.size().width);
         (0..self.size().height).any(|y| {
             self.read_row(y, &mut row);

@@ -7,15 +7,15 @@ use ndfmap_core::grid::Size;
 /// A pinhole camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Where it is.
+    /// Position of the eye.
     pub eye: DVec3,
-    /// What is in the middle of the picture.
+    /// Point in the middle of the picture.
     pub target: DVec3,
-    /// What is up in the picture; must not point along the view.
+    /// Up direction of the picture; must not point along the view.
     pub up: DVec3,
     /// Full angle of view from the bottom to the top of the picture, in degrees.
     pub degrees: f64,
-    /// How far the picture's raster is moved, in pixels: a drift of the camera smaller than a pixel.
+    /// Shift of the picture's raster, in pixels: a drift of the camera smaller than a pixel.
     pub shift: DVec2,
 }
 
@@ -45,13 +45,13 @@ impl Camera {
 /// Rays through the pixels of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rays {
-    /// Where they start.
+    /// Origin of every ray.
     pub eye: DVec3,
-    /// To the picture's upper left corner, on the plane at distance 1.
+    /// Vector to the picture's upper left corner, on the plane at distance 1.
     pub corner: DVec3,
-    /// One pixel to the right there.
+    /// Step of one pixel to the right, on that plane.
     pub right: DVec3,
-    /// One pixel down there.
+    /// Step of one pixel down, on that plane.
     pub down: DVec3,
 }
 
@@ -64,7 +64,7 @@ impl Rays {
         (self.corner + self.right * at.x + self.down * at.y).normalize()
     }
 
-    /// How far a hit on a plane of this normal moves as the pixel moves one to the right, and one down.
+    /// Movements of a hit on a plane of this normal as the pixel moves one to the right, and one down.
     ///
     /// To first order, so that a neighbour beyond the plane's horizon does no harm (Igehy 1999, "Tracing Ray
     /// Differentials", equations 10 and 12, for rays that start in one point).
@@ -107,7 +107,7 @@ mod tests {
         assert!((top - DVec3::new(0.0, 1.0, -1.0).normalize()).length() < 1e-15, "{top}");
         let left = rays.direction(DVec2::new(0.0, 50.0));
         assert!((left - DVec3::new(-2.0, 0.0, -1.0).normalize()).length() < 1e-15, "{left}");
-        // A raster moved one pixel to the right shows what was one pixel to the left.
+        // A raster moved one pixel to the right shows the picture one pixel to the left.
         let moved = Camera { shift: DVec2::X, ..camera }.rays(size);
         assert!(
             (moved.direction(DVec2::new(11.0, 7.0)) - rays.direction(DVec2::new(10.0, 7.0))).length() < 1e-15

@@ -20,7 +20,7 @@ const SIDE: f64 = 2.6;
 /// Radius of the ball, and how far cloth stays off it.
 const BALL: f64 = 0.7;
 const GAP: f64 = 0.02;
-/// Where the cloth starts.
+/// Height at which the cloth starts.
 const START: f64 = 0.8;
 /// Steps of the whole animation, of 1/120 s.
 const STEPS: f64 = 180.0;

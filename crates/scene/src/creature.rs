@@ -28,7 +28,7 @@ fn spline(points: &[(DVec3, f64)], t: f64) -> (DVec3, f64) {
     (place, mix(a.1, b.1, c.1, d.1).max(0.004))
 }
 
-/// From the tip of the tail to the nose: places and radii.
+/// Body from the tip of the tail to the nose: places and radii.
 const BODY: [([f64; 3], f64); 12] = [
     ([-2.7, 0.1, 0.75], 0.01),
     ([-2.2, 0.14, 0.5], 0.07),
@@ -44,7 +44,7 @@ const BODY: [([f64; 3], f64); 12] = [
     ([1.92, 0.63, -0.13], 0.02),
 ];
 
-/// One leg on its side (z = 1 or -1): hip, knee, ankle, toe.
+/// Leg on its side of the body (z = 1 or -1): hip, knee, ankle, toe.
 fn leg(hip: f64, side: f64) -> Vec<(DVec3, f64)> {
     let at = |x: f64, y: f64, z: f64, r: f64| (DVec3::new(hip + x, y, side * z), r);
     vec![

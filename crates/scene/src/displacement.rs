@@ -1,4 +1,4 @@
-//! Relief: what a height map makes of the mesh that it lies on.
+//! Relief: displacement of a mesh by the height map that lies on it.
 //!
 //! A mesh with relief is displaced along its normals by `depth` times the height. Shading works in the frames
 //! of the mesh as it was, where the slopes of the relief are those of the map, but for how the map is
@@ -26,7 +26,7 @@ pub struct Displacement {
     pub width: f64,
     /// World length of a height of one texture width.
     pub depth: f64,
-    /// How far the relief stands out or goes in, at most, in the world.
+    /// Greatest world length by which the relief stands out or goes in.
     pub reach: f64,
 }
 
@@ -95,15 +95,15 @@ pub(super) fn texture_width<'a>(meshes: impl Iterator<Item = &'a Mesh>, aspect: 
 }
 
 impl Mesh {
-    /// The mesh in triangles small enough for a relief to be tessellated in, with how slopes lie on it at
-    /// each vertex.
+    /// The mesh in triangles small enough for a relief to be tessellated in, with the matrix at each vertex
+    /// that takes slopes of the map to the surface.
     #[must_use]
     pub fn with_displacement(&self, displacement: &Displacement) -> Self {
         split(&Self { stretches: self.slope_maps(displacement), ..self.clone() })
     }
 
-    /// How slopes of the map lie on the surface, at each vertex: from the mean of the triangles around, by
-    /// area.
+    /// Matrices that take slopes of the map to the surface, one for each vertex: from the mean of the
+    /// triangles around, by area.
     fn slope_maps(&self, displacement: &Displacement) -> Vec<Mat2> {
         let mut sums = vec![(DMat2::ZERO, 0.0); self.vertices.len()];
         for t in &self.triangles {
@@ -134,7 +134,7 @@ impl Mesh {
         }
         let of = |(sum, weight): (DMat2, f64)| {
             let mean = sum * (1.0 / weight.max(f64::MIN_POSITIVE));
-            // Where the map is crushed to a line, as at a pole, there is no telling: it lies evenly there.
+            // Where the map is crushed to a line, as at a pole, nothing can be told: it counts as even there.
             if mean.determinant().abs() < 1e-6 * displacement.width * displacement.width {
                 return Mat2::IDENTITY * (displacement.depth / displacement.width) as f32;
             }

@@ -2,8 +2,8 @@
 //! far pictures of them are apart ([`metrics`]).
 //!
 //! World: right-handed, y up, no unit. A scene that moves is a function of time, 0 to 1; nothing else is kept
-//! between frames. [`TABLE`] has one row for each built-in scene, and a row buys the tests at the end of this
-//! file.
+//! between frames. [`TABLE`] has one row for each built-in scene, and the tests at the end of this file run
+//! over its rows.
 
 mod armour;
 mod baked;
@@ -46,7 +46,7 @@ use ndfmap_core::units::SlopeVariance;
 /// A mesh of one material.
 #[derive(Clone, Debug)]
 pub struct Object {
-    /// Its shape.
+    /// Shape of the object.
     pub mesh: Arc<Mesh>,
     /// Index into the scene's materials.
     pub material: usize,
@@ -54,16 +54,16 @@ pub struct Object {
 
 /// All that a picture shows.
 pub struct Scene {
-    /// Where it is seen from.
+    /// Camera that sees the scene.
     pub camera: Camera,
-    /// What is seen.
+    /// Objects of the scene.
     pub objects: Vec<Object>,
-    /// What it is made of.
+    /// Materials of the objects.
     pub materials: Vec<Material>,
-    /// What it is lit by.
+    /// Lights of the scene.
     pub lights: Vec<Light>,
-    /// Light from everywhere. It reaches every normal from all directions that face it: what is below the
-    /// base surface does, too.
+    /// Light from everywhere. It reaches every normal from all directions that face it, even from below the
+    /// base surface.
     pub environment: Option<SceneEnvironment>,
     /// Radiance where nothing is hit, linear RGB.
     pub background: Vec3,
@@ -71,7 +71,7 @@ pub struct Scene {
     pub exposure: f32,
 }
 
-/// How a built-in scene is to be set up.
+/// Options of a built-in scene.
 #[derive(Clone)]
 pub struct SceneOptions {
     /// Time, 0 to 1.
@@ -103,13 +103,13 @@ impl SceneOptions {
 
 /// A row of [`TABLE`].
 pub struct Row {
-    /// Its name on the command line.
+    /// Name on the command line.
     pub name: &'static str,
-    /// One line for help and docs.
+    /// Summary in one line, for help and docs.
     pub summary: &'static str,
-    /// What moves as time goes from 0 to 1.
+    /// Motion as time goes from 0 to 1, in words.
     pub animation: &'static str,
-    /// Sets it up.
+    /// Sets the scene up.
     pub build: fn(&SceneOptions) -> Scene,
 }
 
@@ -137,9 +137,8 @@ pub fn find(name: &str) -> Option<&'static Row> {
 }
 
 impl Scene {
-    /// Gives every material this lobe. A diffuse one leaves no highlight: what was specular colour becomes
-    /// albedo. One that was measured brings its own colours, and Han et al.'s model, with which it is what
-    /// was measured.
+    /// Gives every material this lobe. A diffuse lobe leaves no highlight: specular colour becomes albedo. A
+    /// measured lobe brings its own colours, and Han et al.'s model, with which it reflects as was measured.
     pub fn set_brdf(&mut self, lobe: &dyn Lobe) {
         for material in &mut self.materials {
             material.brdf.lobe = lobe.widen(SlopeVariance::ZERO);
@@ -161,9 +160,9 @@ impl Scene {
         self.materials.iter_mut().for_each(|m| m.brdf.shading = shading);
     }
 
-    /// Lets maps with heights displace what they lie on: by `scale` times what keeps their slopes, so that 1
-    /// is the surface that the map was made of. Lobes become those of microfacets; facets hide each other
-    /// from the eye, and, with `shadows`, from lights.
+    /// Lets maps with heights displace the meshes they lie on: by `scale` times the depth that keeps their
+    /// slopes, so that 1 is the surface that the map was made of. Lobes become those of microfacets; facets
+    /// hide each other from the eye, and, with `shadows`, from lights.
     ///
     /// # Errors
     /// [`NoHeights`] when no map has any.
@@ -234,7 +233,7 @@ impl Scene {
     }
 }
 
-/// A scene without heights cannot be displaced.
+/// Error of displacing a scene without heights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("none of the scene's maps has heights")]
 pub struct NoHeights;
@@ -250,7 +249,7 @@ fn brdf(shading: ShadingModel, lobe: &str) -> Brdf {
     Brdf::new(lobe, shading)
 }
 
-/// From `a` to `b` by equal factors, as time goes from 0 to 1.
+/// Value that goes from `a` to `b` by equal factors, as time goes from 0 to 1.
 fn zoom(a: f64, b: f64, time: f64) -> f64 {
     a * (b / a).powf(time)
 }

@@ -1,4 +1,4 @@
-//! Materials: a normal or height map, what lies under it, and how it reflects.
+//! Materials: a normal or height map, its surface parameters, and its BRDF.
 
 use std::ops::Deref;
 use std::sync::Arc;
@@ -25,7 +25,7 @@ pub struct SurfaceTextures {
 }
 
 impl SurfaceTextures {
-    /// What a texel is made of; `specular` where the map has none.
+    /// Surface parameters of a texel; `specular` is the specular colour where the map has none.
     #[must_use]
     pub fn at(&self, x: usize, y: usize, specular: DVec3) -> SurfaceParams {
         let of = |map: &Grid<[f32; 4]>| map.row(y)[x];
@@ -46,7 +46,7 @@ impl SurfaceTextures {
         std::iter::once(&self.diffuse_roughness).chain(&self.specular).map(|map| (**map).clone()).collect()
     }
 
-    /// A finish from its channels, filtered or not.
+    /// Surface parameters from their channels, filtered or not.
     #[must_use]
     pub fn from_channels(
         diffuse_roughness: [f32; 4],
@@ -61,7 +61,7 @@ impl SurfaceTextures {
         }
     }
 
-    /// The map with the specular colour as albedo, where it is the brighter.
+    /// Textures without a highlight: specular colour becomes albedo, where it is the brighter.
     #[must_use]
     pub(super) fn without_highlight(self) -> Self {
         let Some(specular) = &self.specular else { return self };
@@ -73,7 +73,7 @@ impl SurfaceTextures {
     }
 }
 
-/// Map of a material; to be looked at as the surface that it is.
+/// Map of a material, which derefs to its surface.
 #[derive(Clone)]
 pub enum MaterialMap {
     /// A surface, baked by every method that draws it.
@@ -83,7 +83,7 @@ pub enum MaterialMap {
 }
 
 impl MaterialMap {
-    /// The stored map as a method reads it, where it was baked before and the method reads it.
+    /// Stored map as the method reads it; `None` where it was not baked before or the method cannot read it.
     #[must_use]
     pub fn baked(&self, method: &dyn Method) -> Option<Pyramid> {
         match self {
@@ -116,18 +116,18 @@ impl From<BakedSurface> for MaterialMap {
     }
 }
 
-/// What an object is made of.
+/// Material of objects: map, surface parameters and BRDF.
 pub struct Material {
-    /// What it is called.
+    /// Name of the material.
     pub name: String,
-    /// Its normals and heights.
+    /// Map of its normals and heights.
     pub map: MaterialMap,
-    /// What is the same everywhere; `textures`, where there is one, is in its place.
+    /// Surface parameters that are the same everywhere; `textures`, if any, are in their place.
     pub params: SurfaceParams,
     /// Colours and roughness of each texel, of the surface's size.
     pub textures: Option<SurfaceTextures>,
-    /// What of it stands out of its meshes; `None` for a map of normals alone.
+    /// Displacement of its meshes; `None` for a map of normals alone.
     pub displacement: Option<Displacement>,
-    /// Lobe and model.
+    /// Lobe and shading model.
     pub brdf: Brdf,
 }

@@ -19,11 +19,11 @@ pub struct Vertex {
 /// Triangles, counter-clockwise from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
-    /// Corners.
+    /// Corners of the triangles.
     pub vertices: Vec<Vertex>,
-    /// Three corners each.
+    /// Indices of the three corners of each triangle.
     pub triangles: Vec<[u32; 3]>,
-    /// For a mesh with relief, how slopes of the map lie on it at each vertex; else none.
+    /// Matrices that take slopes of the map to a mesh with relief, one for each vertex; else none.
     pub stretches: Vec<Mat2>,
 }
 
@@ -44,7 +44,7 @@ impl Mesh {
             let along = |a: DVec2| place(s + a.x, t + a.y) - place(s - a.x, t - a.y);
             let (ds, dt) = (along(DVec2::new(step, 0.0)), along(DVec2::new(0.0, step)));
             let normal = ds.cross(dt).try_normalize().unwrap_or_else(|| {
-                // At a pole one of the two vanishes: a little way off it does not.
+                // At a pole one of the two differences vanishes: a little way off it does not.
                 let (s, t) = (s.clamp(0.01, 0.99), t.clamp(0.01, 0.99));
                 let ds = place(s + step, t) - place(s - step, t);
                 let dt = place(s, t + step) - place(s, t - step);
@@ -108,7 +108,7 @@ impl Mesh {
     }
 }
 
-/// Sum around each vertex of its triangles' normals, each twice as long as its triangle is large; not
+/// Sum of the normals of the triangles around each vertex, each as long as twice its triangle's area; not
 /// normalised.
 #[must_use]
 pub fn area_normals(places: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {

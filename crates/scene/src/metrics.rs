@@ -1,4 +1,4 @@
-//! How far two pictures are apart, and how much a moving picture sparkles.
+//! Metrics of pictures: how far two are apart, and how much a moving one sparkles.
 //!
 //! Pictures are linear RGB, high dynamic range; a *display value* is one of them times the exposure, clipped
 //! to 0..1 and encoded as sRGB. FLIP, the perceptual difference, comes from its own library and is not here.

@@ -1,8 +1,8 @@
 //! A sphere of Gaussian roughness, lit from where it is seen, after Dupuy et al. 2013, tables 3 to 5; meant
 //! to be displaced.
 //!
-//! Its map is of longitude and latitude: only as relief, which knows how the map is stretched, has it the
-//! same slopes everywhere.
+//! Its map is of longitude and latitude. The slopes are the same everywhere only as relief, which knows how
+//! the map is stretched.
 
 use std::f64::consts::PI;
 use std::sync::Arc;

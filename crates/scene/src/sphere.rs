@@ -1,4 +1,4 @@
-//! One sphere that moves away, after Han et al. 2007, figure 6.
+//! Sphere that moves away, after Han et al. 2007, figure 6.
 
 use std::f64::consts::{PI, TAU};
 

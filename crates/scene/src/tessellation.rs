@@ -1,13 +1,13 @@
 //! Tessellation: a mesh with relief in triangles of about four pixels, displaced by the heights of the same
 //! scale.
 //!
-//! Each triangle of the base mesh is a patch: a grid of `segments` on a side, a power of two. How many is up
-//! to its longest edge as seen; an edge that needs fewer has its points moved together, so that patches on
-//! both sides of it have the same, and there are no cracks. What an edge needs, and how high a point is,
-//! depends on nothing but themselves and the eye. (Where vertices at one place have different normals or lie
-//! on different parts of the map, at hard edges and seams, displacement tears the mesh.) Planning takes a
-//! pass over the base mesh; the points are worked out here ([`expand`]), or by the twin in
-//! `tessellation.wgsl`.
+//! Each triangle of the base mesh is a patch: a grid of `segments` on a side, a power of two. Its longest
+//! edge as seen decides how many. An edge that needs fewer has its points moved together, so that patches on
+//! both sides of it have the same, and there are no cracks. The segments of an edge depend only on the edge
+//! and the eye, the height of a point only on the point and the eye. (Where vertices at one place have
+//! different normals or lie on different parts of the map, at hard edges and seams, displacement tears the
+//! mesh.) Planning takes a pass over the base mesh; the points are worked out here ([`expand`]), or by the
+//! twin in `tessellation.wgsl`.
 
 use glam::{DVec2, DVec3, Mat2, Vec2, Vec3};
 use rayon::prelude::*;
@@ -22,7 +22,7 @@ pub const TESSELLATION: &str = include_str!("tessellation.wgsl");
 /// with a right angle, triangles of two to eight pixels.
 const EDGE_PIXELS: f64 = 5.7;
 
-/// Heights are those of a scale this many pixels wide: what triangles of that size can show.
+/// Scale at which heights are taken, in pixels: as fine as triangles of that size can show.
 pub const HEIGHT_PIXELS: f64 = 2.0;
 
 /// Most segments on a side of a patch.
@@ -31,7 +31,7 @@ const MOST_SEGMENTS: u32 = 512;
 /// Most triangles of a plan, but for those of the base mesh.
 const MOST_TRIANGLES: u64 = 1 << 24;
 
-/// Segments along a texel at most: finer ones would show nothing more.
+/// Most segments along a texel: finer ones would show nothing more.
 const SEGMENTS_PER_TEXEL: f64 = 2.0;
 
 /// A triangle of the base mesh and how it is cut.
@@ -49,14 +49,14 @@ pub struct Patch {
     pub first_triangle: u32,
 }
 
-/// How a mesh is cut.
+/// Plan for cutting a mesh.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Plan {
     /// The patches that may be seen.
     pub patches: Vec<Patch>,
-    /// Points of them all.
+    /// Points of all patches.
     pub points: u32,
-    /// Triangles of them all.
+    /// Triangles of all patches.
     pub triangles: u32,
 }
 
@@ -70,7 +70,7 @@ impl Plan {
     }
 }
 
-/// What a picture sees: a cone of four planes, widened by a few pixels.
+/// View frustum of a picture: a cone of four planes, widened by a few pixels.
 struct Frustum {
     eye: DVec3,
     /// Unit normals of the planes, inward; the first is the plane of the eye.
@@ -122,7 +122,7 @@ impl Frustum {
     }
 }
 
-/// How a mesh with relief is cut for a picture.
+/// Plan for cutting a mesh with relief for a picture.
 #[must_use]
 pub fn plan(mesh: &Mesh, displacement: &Displacement, rays: &Rays, size: Size) -> Plan {
     let frustum = Frustum::new(rays, size);
@@ -136,7 +136,7 @@ pub fn plan(mesh: &Mesh, displacement: &Displacement, rays: &Rays, size: Size) -
             .then(|| [0, 1, 2].map(|k| frustum.segments(&corners[k], &corners[(k + 1) % 3], displacement)))
     };
     let all: Vec<Option<[u32; 3]>> = mesh.triangles.par_iter().map(edges).collect();
-    // Never more than memory has room for, be the eye ever so near: all edges alike are cut less finely.
+    // However near the eye, never more than memory has room for: all edges alike are cut less finely.
     let triangles = |coarser: u32| -> u64 {
         let segments = |e: &[u32; 3]| u64::from((e[0].max(e[1]).max(e[2]) >> coarser).max(1));
         all.iter().flatten().map(|e| segments(e).pow(2)).sum()
@@ -156,7 +156,7 @@ pub fn plan(mesh: &Mesh, displacement: &Displacement, rays: &Rays, size: Size) -
 /// and `c` along it, 0 to `r`.
 fn weights(patch: &Patch, r: u32, c: u32) -> [f32; 3] {
     let n = patch.segments;
-    // On an edge that shows fewer segments, the point of it that is next.
+    // Nearest point of an edge that shows fewer segments.
     let moved = |k: u32, edge: u32| {
         let ratio = n / edge;
         (k + ratio / 2) / ratio * ratio
@@ -190,7 +190,7 @@ fn point_of(i: u32) -> (u32, u32) {
 }
 
 /// The corners of a grid's triangle, as numbers of points: rows have one, three, five triangles, every other
-/// one of them on its head.
+/// one of them upside down.
 fn corners_of(i: u32) -> [u32; 3] {
     let mut row = f64::from(i).sqrt() as u32;
     if (row + 1) * (row + 1) <= i {
@@ -361,7 +361,7 @@ mod tests {
         // foreshortened on the way round.
         assert!(count(512, 0.0) < 300 * 300, "{}", count(512, 0.0));
         assert_eq!(count(512, 0.0), count(1024, 0.0));
-        // From afar the base mesh is what is left.
+        // From afar only the base mesh is left.
         let base = 2 * 96 * 96;
         assert!(count(512, 1.0) < 2 * base, "{}", count(512, 1.0));
     }

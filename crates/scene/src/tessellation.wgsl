@@ -14,7 +14,7 @@ struct Patch {
     first_triangle: u32,
 }
 
-// On an edge of `segments` that shows fewer, the point of it that is next.
+// Nearest point of an edge of `segments` that shows fewer.
 fn moved(k: u32, segments: u32, edge: u32) -> u32 {
     let ratio = segments / edge;
     return (k + ratio / 2u) / ratio * ratio;

@@ -1,8 +1,8 @@
-//! Tone mapping: from light of any brightness to what a screen can show, before the screen's own curve.
+//! Tone mapping: from light of any brightness to a screen's range, before the screen's own curve.
 
 use glam::Vec3;
 
-/// How light is brought into a screen's range.
+/// Tone mapping, which brings light into a screen's range.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tone {
     /// Cut off at 1. Errors are always measured so.
@@ -19,10 +19,10 @@ pub const WHITE: f32 = 4.0;
 const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 
 impl Tone {
-    /// Every one.
+    /// Every tone mapping.
     pub const ALL: [Self; 2] = [Self::Clip, Self::Reinhard];
 
-    /// As spelled on the command line.
+    /// Name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -31,7 +31,7 @@ impl Tone {
         }
     }
 
-    /// A colour, exposed already, as it is to be shown; hue and saturation stay.
+    /// Colour to show for one that is exposed already; hue and saturation stay.
     #[must_use]
     pub fn map(self, colour: Vec3) -> Vec3 {
         let luminance = colour.dot(LUMINANCE);

@@ -1,20 +1,20 @@
-//! Truths: what a renderer by brute force is asked for, and what it gives back.
+//! Truths by brute force: the effort that a renderer is asked for, and the picture that it gives back.
 
 use crate::metrics::Picture;
 
-/// When a truth is good enough.
+/// Effort for a truth: when it is good enough.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
     /// Rays a pixel, at most; a renderer rounds them up to what it takes at once.
     pub rays: usize,
-    /// Noise below which it is good enough, too; 0 never is.
+    /// Noise below which fewer rays are good enough, too; with 0 they never are.
     pub noise: f64,
     /// Different seeds give independent truths, where a renderer draws by chance.
     pub seed: u64,
 }
 
 impl Effort {
-    /// So many rays, whatever the noise.
+    /// Effort of so many rays, whatever the noise.
     #[must_use]
     pub fn rays(rays: usize) -> Self {
         Self { rays, noise: 0.0, seed: 0 }
@@ -26,9 +26,8 @@ impl Effort {
 pub struct TruePicture {
     /// Linear RGB.
     pub picture: Picture,
-    /// Rays a pixel that it took.
+    /// Number of rays a pixel that it took.
     pub rays: usize,
-    /// Noise floor: relative L2 error that the picture has for want of rays, from the difference of its two
-    /// halves.
+    /// Noise floor: relative L2 error of the picture for want of rays, from the difference of its two halves.
     pub noise: f64,
 }

@@ -30,7 +30,7 @@ pub(crate) fn cells(size: Size) -> Size {
     Size { width: (size.width + 1) * STEPS, height: (size.height + 1) * STEPS }
 }
 
-/// A camera whose pixels are those cells.
+/// Camera whose pixels are the [`cells`].
 pub(crate) fn cell_camera(camera: &Camera, size: Size) -> Camera {
     // The angle of view grows by the added pixel; the middle moves by half of it, and the eye looks where it
     // looked.
@@ -40,8 +40,8 @@ pub(crate) fn cell_camera(camera: &Camera, size: Size) -> Camera {
     Camera { degrees: 2.0 * tangent.atan().to_degrees(), shift, ..*camera }
 }
 
-/// Every frame from the cells' radiance: a pixel is the mean of the cells it covers, so frames differ by what
-/// enters and leaves, and by nothing that is mere chance in between.
+/// Every frame from the cells' radiance: a pixel is the mean of the cells it covers, so frames differ only by
+/// the cells that enter and leave, and not by mere chance in between.
 pub(crate) fn frames(cells: &[DVec3], size: Size) -> Vec<Picture> {
     let width = (size.width + 1) * STEPS;
     // Sums over everything above and to the left: any rectangle is four of them.

@@ -1,4 +1,4 @@
-//! What rays hit: all triangles of a scene in one hierarchy, and the place they are hit in.
+//! Geometry that rays hit: all triangles of a scene in one hierarchy, and the places of hits.
 
 use std::time::Duration;
 
@@ -14,13 +14,14 @@ use obvhs::ray::{Ray, RayHit};
 pub struct Geometry {
     /// Corners, object, in the order of the scene.
     triangles: Vec<Triangle>,
-    /// How slopes of maps lie at each triangle's corners; none in a scene without relief.
+    /// Matrices that take slopes of maps to the surface, at each triangle's corners; none in a scene without
+    /// relief.
     stretches: Vec<[Mat2; 3]>,
     /// `None` for a scene without triangles.
     hierarchy: Option<CwBvh>,
-    /// A sphere around everything. Boxes are in single floats, so they and the rays are taken from its
-    /// middle, and rays from where they enter it: however far away the scene or the eye may be, digits go to
-    /// what is between.
+    /// Middle of a sphere around everything. Boxes are in single floats, so they and the rays are relative to
+    /// it, and rays begin where they enter the sphere: no digits are lost to the distance of the scene from
+    /// the origin, or of the eye from the scene.
     middle: DVec3,
     radius: f64,
 }
@@ -35,7 +36,7 @@ struct Triangle {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     triangle: u32,
-    /// Along the unit direction of the ray.
+    /// Distance along the unit direction of the ray.
     pub distance: f64,
     /// Weights of the second and third corner.
     barycentric: DVec2,
@@ -44,19 +45,19 @@ pub struct Hit {
 /// The place of a hit.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
-    /// In the world.
+    /// Position in the world.
     pub position: DVec3,
     /// Tangent, bitangent and normal of the base surface, orthonormal, as columns; the normal faces the eye.
     pub frame: DMat3,
     /// Unit normal of the triangle itself, towards the eye.
     pub face: DVec3,
-    /// On the map, v down the rows.
+    /// Place on the map, v down the rows.
     pub uv: DVec2,
     /// Index into the scene's materials.
     pub material: usize,
     /// Index into the scene's objects.
     pub object: usize,
-    /// On a mesh with relief, how slopes of the map lie in the frame.
+    /// Matrix that takes slopes of the map to the frame, on a mesh with relief.
     pub stretch: Option<DMat2>,
 }
 
@@ -68,13 +69,13 @@ impl Geometry {
         Self::of(scene, &scene.objects)
     }
 
-    /// The same with meshes cut and displaced for a picture of this size.
+    /// Builds it with meshes cut and displaced for a picture of this size.
     #[must_use]
     pub fn displaced(scene: &Scene, camera: &Camera, size: Size) -> Self {
         Self::of(scene, &scene.displaced_for(camera, size))
     }
 
-    /// Only the meshes that have no relief.
+    /// Builds it from only the meshes that have no relief.
     #[must_use]
     pub fn without_displacement(scene: &Scene) -> Self {
         let bare = |o: &Object| match scene.materials[o.material].displacement {
@@ -119,7 +120,7 @@ impl Geometry {
         self.triangles.len()
     }
 
-    /// True for a scene of nothing.
+    /// True for a scene without triangles.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.triangles.is_empty()
@@ -149,7 +150,7 @@ impl Geometry {
         nearest
     }
 
-    /// What lies where a ray of this direction hit.
+    /// Place that a ray of this direction hit.
     ///
     /// Seen from behind, a surface shows its back, frame turned about the tangent. Where the normal between
     /// corners has turned away from an eye that the triangle itself faces, it is bent back until it just does
@@ -168,8 +169,8 @@ impl Geometry {
         let facing = -normal.dot(direction);
         let stretch = self.stretches.get(hit.triangle as usize).map(|[p, q, u]| {
             let stretch = (*p).as_dmat2() * r + (*q).as_dmat2() * s + (*u).as_dmat2() * t;
-            // From behind, what stands out goes in, along the turned frame: only the slope along the tangent
-            // changes its sign.
+            // From behind, relief that stands out goes in, along the turned frame: only the slope along the
+            // tangent changes its sign.
             DMat2::from_diagonal(DVec2::new(side, 1.0)) * stretch
         });
         let stretch = stretch.filter(|stretch| stretch.is_finite());
@@ -193,7 +194,7 @@ impl Geometry {
         }
     }
 
-    /// How the place on the map moves as the pixel moves one to the right, and one down.
+    /// Movements of the place on the map as the pixel moves one to the right, and one down.
     #[must_use]
     pub fn differentials(&self, hit: &Hit, place: &Place, rays: &Rays, at: DVec2) -> [DVec2; 2] {
         let [a, b, c] = self.triangles[hit.triangle as usize].corners;

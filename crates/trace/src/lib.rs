@@ -2,7 +2,7 @@
 //! and BRDFs.
 //!
 //! [`truth`] is brute force: many rays a pixel, each shading one texel of the map as it is. [`filtered`]
-//! shades each pixel once, through a baked representation, at the reach of its ray. What parts them is the
+//! shades each pixel once, through a baked representation, at the reach of its ray. Their difference is the
 //! error of the representation. Pixels are worked out one by one, each from its own random numbers: the same
 //! picture for any number of threads.
 
@@ -20,8 +20,8 @@ use glam::{DMat3, DVec3};
 use ndfmap_core::brdf::Directions;
 use ndfmap_core::light::Light;
 
-/// The ways from each light that reaches a place to the eye, in the place's tangent frame, with the light's
-/// irradiance; `between` makes a way of two directions.
+/// Directions from each light that reaches a place to the eye, in the place's tangent frame, with the light's
+/// irradiance; `between` makes [`Directions`] of two vectors.
 fn incident_directions<'a>(
     lights: &'a [Light],
     (place, frame): (DVec3, DMat3),

@@ -1,4 +1,4 @@
-//! Arguments that several commands take, and how they are read.
+//! Arguments that several commands take, and their parsers.
 
 use std::path::PathBuf;
 
@@ -69,7 +69,7 @@ enum FilterArgument {
 }
 
 impl SourceArguments {
-    /// The same as the library has it, for built-in maps of this size.
+    /// Returns the options in the library's form, for built-in maps of this size.
     pub(super) fn options(&self, builtin_size: Size) -> SourceOptions {
         SourceOptions {
             kind: self.from.map(|from| match from {
@@ -130,7 +130,7 @@ pub(super) struct EnvironmentArguments {
 }
 
 impl EnvironmentArguments {
-    /// Reads and prepares it.
+    /// Reads and prepares the environment, if one was asked for.
     pub(super) fn read(&self) -> Result<Option<RotatingEnvironment>, Error> {
         let Some(path) = &self.environment else { return Ok(None) };
         let (environment, warnings) = read_environment(path)?;
@@ -153,7 +153,7 @@ impl EnvironmentArguments {
 }
 
 impl EnvironmentArguments {
-    /// What a script may want to know of it.
+    /// JSON of the environment, for scripts.
     pub(super) fn to_json(&self, read: &RotatingEnvironment) -> serde_json::Value {
         let suns = &read.environment.filtered.suns;
         json!({
@@ -186,7 +186,7 @@ fn technique(text: &str) -> Result<Technique, String> {
         .ok_or_else(|| format!("`{text}` is none of {names}"))
 }
 
-/// Every built-in environment, for `--help`.
+/// List of every built-in environment, for `--help`.
 pub(super) fn environments_help() -> String {
     let rows = builtin::TABLE.iter().map(|r| format!("  {:12} {}", r.name, r.summary));
     format!("Built-in environments (`builtin:NAME`):\n{}", rows.collect::<Vec<_>>().join("\n"))
@@ -235,7 +235,7 @@ pub(super) fn method_spelling(text: &str) -> Result<String, String> {
     }
 }
 
-/// What a file of measurements is spelled with.
+/// Prefix in the spelling of a measured lobe, before its file.
 const MERL: &str = "merl:";
 
 /// Checks a BRDF's spelling; an unknown one suggests the nearest. Files are for [`read_brdf`] to check.
@@ -255,7 +255,7 @@ pub(super) fn brdf_spelling(text: &str) -> Result<String, String> {
     }
 }
 
-/// The lobe of a checked spelling. Of one that was measured it is said what its factors leave.
+/// Reads the lobe of a checked spelling. For a measured one it prints what its factors leave out.
 pub(super) fn read_brdf(spelling: &str) -> Result<AnyLobe, Error> {
     let lobe: AnyLobe = match spelling.strip_prefix(MERL) {
         Some(file) => {
@@ -280,7 +280,7 @@ pub(super) fn read_brdf(spelling: &str) -> Result<AnyLobe, Error> {
     Ok(lobe)
 }
 
-/// Checks the name of a scene; what is neither built in nor named like a model suggests the nearest.
+/// Checks the name of a scene; a name neither built in nor like a model's file suggests the nearest.
 pub(super) fn scene_name(text: &str) -> Result<String, String> {
     if scene::find(text).is_some() || is_model(text.as_ref()) {
         return Ok(text.to_owned());
@@ -292,7 +292,7 @@ pub(super) fn scene_name(text: &str) -> Result<String, String> {
 
 /// Says that a name is unknown, and which is nearest.
 pub(super) fn unknown(name: &str, known: impl Iterator<Item = &'static str> + Clone) -> String {
-    // Below 0.7 the nearest is merely the least far.
+    // A nearest name below 0.7 is not near.
     let near = known.clone().filter(|k| strsim::jaro_winkler(name, k) > 0.7);
     let nearest = near.max_by(|a, b| strsim::jaro_winkler(name, a).total_cmp(&strsim::jaro_winkler(name, b)));
     let all = known.collect::<Vec<_>>().join(", ");
@@ -302,7 +302,7 @@ pub(super) fn unknown(name: &str, known: impl Iterator<Item = &'static str> + Cl
     }
 }
 
-/// Every name of a table with its parameters and summary, for `--help`.
+/// List of every method with its parameters and summary, and of every built-in map, for `--help`.
 pub(super) fn methods_help() -> String {
     let rows =
         ndf::TABLE.iter().map(|r| format!("  {}{}\n      {} ({})", r.name, r.parameters, r.summary, r.paper));
@@ -318,7 +318,7 @@ fn builtin_help() -> String {
     rows.collect::<Vec<_>>().join("\n")
 }
 
-/// Every BRDF with its parameter and summary, for `--help`.
+/// List of every BRDF with its parameter and summary, for `--help`.
 pub(super) fn brdfs_help() -> String {
     let rows = brdf::TABLE.iter().map(|r| format!("  {}{}\n      {}", r.name, r.parameter, r.summary));
     let merl = "  merl:FILE\n      a file of measurements in the MERL format (.binary), factored, in its own colours".to_owned();

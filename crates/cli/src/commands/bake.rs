@@ -20,7 +20,7 @@ use super::{print, print_json, say_if_replaced, warn};
 use crate::tables;
 use crate::terminal::Terminal;
 
-/// The spelling that asks for a choice of method.
+/// Spelling that asks for a choice of method.
 const AUTO: &str = "auto";
 
 /// Bake a normal or height map into a normal distribution map
@@ -70,7 +70,7 @@ enum Layout {
     Bumpslopes,
 }
 
-/// A file, and how its values are to be taken.
+/// File of an attribute, with the transfer function of its values.
 #[derive(Clone, Debug)]
 struct AttributePath {
     path: PathBuf,
@@ -94,7 +94,7 @@ fn method_or_auto(text: &str) -> Result<String, String> {
 }
 
 impl Bake {
-    /// Options that contradict each other, found before anything is read.
+    /// Refuses options that contradict each other, before anything is read.
     fn check(&self) -> Result<(), Error> {
         let extension = self.output.extension().map(|e| e.to_string_lossy().to_lowercase());
         let extension = extension.as_deref().unwrap_or_default();
@@ -118,7 +118,7 @@ impl Bake {
         Err(Error::Request(wrong))
     }
 
-    /// The method asked for, or chosen by measuring.
+    /// Method that was asked for, or is chosen by measuring.
     fn choose(&self, map: &SourceMap, terminal: &Terminal) -> Result<(AnyMethod, Option<Choice>), Error> {
         if self.method != AUTO {
             return Ok((self.method.parse()?, None));

@@ -26,7 +26,7 @@ use super::{print, print_json, say_if_replaced, to_value, warn};
 use crate::tables;
 use crate::terminal::Terminal;
 
-/// What every comparison carries unless told otherwise: the baselines, each linear method, and mixtures.
+/// Methods of every comparison unless told otherwise: the baselines, each linear method, and mixtures.
 pub(super) const DEFAULT_METHODS: &str =
     "fixed,naive,toksvig,ndm,ndm:plane,slopes,sh:4,sh:7,gmm:4,vmf:2,vmf:4,vmf:6";
 
@@ -142,7 +142,7 @@ impl Compare {
     }
 }
 
-/// A comparison of a source, perhaps with pictures and a report.
+/// Comparison of a source, perhaps with pictures and a report.
 pub(super) struct Run<'a> {
     pub(super) map: &'a SourceMap,
     pub(super) methods: &'a [AnyMethod],
@@ -162,7 +162,7 @@ pub(super) struct Pictures {
     pub(super) sparkle: bool,
 }
 
-/// What came of it.
+/// Results of a comparison.
 pub(super) struct Measured {
     pub(super) comparison: Comparison,
     pub(super) pictures: Option<RenderReport>,
@@ -172,8 +172,7 @@ pub(super) struct Measured {
 impl Run<'_> {
     /// Measures; with a folder, writes the report.
     pub(super) fn measure(&self, folder: Option<&Path>, terminal: &Terminal) -> Result<Measured, Error> {
-        // A folder that cannot be made, or a scene that is not there, should be known before the minutes of
-        // measuring.
+        // A folder that cannot be made, or a missing scene, should fail before the minutes of measuring.
         if let Some(folder) = folder {
             std::fs::create_dir_all(folder).map_err(|e| MapError::io(folder, e))?;
         }

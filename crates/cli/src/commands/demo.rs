@@ -29,20 +29,20 @@ pub(super) struct Demo {
     output: PathBuf,
 }
 
-/// Crumpled foil, the oldest example of all: shiny facets that dull with distance.
+/// Map of the demo, crumpled foil, the oldest example of all: shiny facets that dull with distance.
 const MAP: &str = "builtin:foil";
 
-/// Sharp enough to sparkle, wide enough that no method is out of its depth.
+/// Lobe of the demo, sharp enough to sparkle and wide enough for every method to represent.
 const BRDF: &str = "blinn-phong:50";
 
-/// Contact sheets of scenes: file, scene, and when.
+/// Contact sheets of scenes: file, scene, and times.
 const SHEETS: [(&str, &str, &[f64]); 2] =
     [("disk.png", "disk", &[0.1, 0.4, 0.7]), ("plane.png", "plane", &[0.0])];
 
-/// What they show beside the truth: what renderers do, what they might, and ours.
+/// Methods that they show beside the truth: what renderers use, what they might use, and ours.
 const SHOWN: [&str; 3] = ["naive", "toksvig", "vmf:4"];
 
-/// A contact sheet of a scene, as a PNG file.
+/// Contact sheet of a scene, as a PNG file.
 fn sheet(scene: &str, times: &[f64], terminal: &Terminal) -> Result<Vec<u8>, Error> {
     let methods = SHOWN.iter().map(|m| m.parse()).collect::<Result<Vec<AnyMethod>, _>>()?;
     let spec = SceneSpec { scene: scene.to_owned(), ..SceneSpec::default() };

@@ -1,4 +1,4 @@
-//! `ndfmap inspect`: what a file is, and one of its texels decoded.
+//! `ndfmap inspect`: describes a file, and decodes one of its texels.
 
 use std::path::PathBuf;
 
@@ -48,7 +48,7 @@ impl Inspect {
     }
 }
 
-/// A JSON object as lines for people, one key each.
+/// Spells a JSON object as lines for people, one key each.
 fn as_lines(value: &Value) -> String {
     let empty = Map::new();
     let all = value.as_object().unwrap_or(&empty);
@@ -61,6 +61,6 @@ fn as_lines(value: &Value) -> String {
         }
         other => format!("{key:name$}  {other}"),
     };
-    // Warnings have been said already, on stderr.
+    // Warnings have already gone to stderr.
     all.iter().filter(|(key, _)| *key != "warnings").map(line).collect::<Vec<_>>().join("\n")
 }

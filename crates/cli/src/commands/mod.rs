@@ -1,8 +1,8 @@
-//! The command line: what all commands share, and the table of commands.
+//! The command line: common part of all commands, and the table of commands.
 //!
-//! A command is one file here and one row of `Command`. Rules that every one of them keeps:
-//! `--json` prints exactly one document on stdout and everything else goes to stderr; exit status 0 done,
-//! 1 failed, 2 wrong usage; nothing is overwritten without saying so.
+//! A command is one file here and one row of `Command`. Every command keeps these rules: `--json` prints
+//! exactly one document on stdout and everything else goes to stderr; exit status is 0 when done, 1 when
+//! failed, 2 for wrong usage; nothing is overwritten without saying so.
 
 mod arguments;
 mod bake;
@@ -93,12 +93,12 @@ fn print_json(value: &impl Serialize) -> Result<(), Error> {
     print(&serde_json::to_string_pretty(value).map_err(|e| Error::Failed(e.to_string()))?)
 }
 
-/// A report as a JSON value, for more to be added.
+/// Returns a report as a JSON value, to which a command may add.
 fn to_value(report: &impl Serialize) -> Result<Value, Error> {
     serde_json::to_value(report).map_err(|e| Error::Failed(e.to_string()))
 }
 
-/// Says a warning on stderr.
+/// Prints a warning on stderr.
 fn warn(map: &Path, warning: &str) {
     eprintln!("ndfmap: warning: {}: {warning}", map.display());
 }

@@ -1,4 +1,4 @@
-//! `ndfmap render`: pictures of a scene, through baked maps and by brute force, and how far they are apart.
+//! `ndfmap render`: pictures of a scene, through baked maps and by brute force, and their differences.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -10,6 +10,7 @@ use ndfmap::core::grid::{Grid, Size};
 use ndfmap::core::light::Light;
 use ndfmap::core::lookup::{Filtering, Lookups, Sampling};
 use ndfmap::core::ndf::AnyMethod;
+use ndfmap::core::observe::Observer;
 use ndfmap::maps::atomic;
 use ndfmap::maps::formats::{read_file, read_ndf};
 use ndfmap::maps::picture::{PictureFormat, write_picture};
@@ -191,7 +192,7 @@ enum Device {
 
 #[cfg(feature = "gpu")]
 impl Device {
-    /// The GPU to render on; `None` for the processor.
+    /// Opens the GPU to render on; `None` for the processor.
     fn open(self) -> Result<Option<ndfmap::gpu::Device>, Error> {
         let opened = match self {
             Self::Cpu => return Ok(None),
@@ -410,9 +411,9 @@ impl Render {
         if let Some(device) = self.device.open()? {
             let gpu = render::Device::Gpu { device, sampler: self.sampler, multisample: self.multisample };
             match render::render(job, &gpu, terminal, each) {
-                // What this GPU cannot do, the processor can; `auto` asked for no more than a picture.
+                // The processor can do all that this GPU cannot; `auto` asked for no more than a picture.
                 Err(Error::Gpu(why)) if self.device == Device::Auto => {
-                    eprintln!("ndfmap: {why}: rendering on the processor");
+                    terminal.note(&format!("{why}: rendering on the processor"));
                 }
                 done => return done,
             }
@@ -429,7 +430,7 @@ impl Render {
         render::render(job, &render::Device::Cpu, terminal, each)
     }
 
-    /// The map, where it is a baked one.
+    /// Reads the map, where it is a baked one.
     fn read_baked(&self) -> Result<Option<BakedSurface>, Error> {
         let file = |path: &&Path| !path.to_str().is_some_and(|p| p.starts_with(BUILTIN_PREFIX));
         let Some(path) = self.map.as_deref().filter(file) else { return Ok(None) };
@@ -528,7 +529,7 @@ impl Render {
     }
 }
 
-/// `name.png` as `name-0007.png`.
+/// Path of a numbered frame: `name.png` becomes `name-0007.png`.
 fn numbered(path: &Path, at: usize) -> PathBuf {
     let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     let extension = path.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();

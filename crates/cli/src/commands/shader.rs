@@ -60,7 +60,7 @@ impl Shader {
             eprintln!("ndfmap: wrote {}", file.display());
         }
         if json {
-            // Without a file the text is in the document; what is no text needs one.
+            // Without a file the text goes into the document; a shader that is not text needs a file.
             let text = if self.output.is_some() { None } else { Some(String::from_utf8(bytes.clone())) };
             let text = text.transpose().map_err(|_| {
                 Error::Request(format!("{} is no text: name a file with `-o`", language.name))

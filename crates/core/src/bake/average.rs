@@ -1,11 +1,11 @@
-//! Sums of a level in single floats, and how they are averaged to the next.
+//! Sums of a level in single floats, and their averages on the next level.
 
 use fearless_simd::{Level, dispatch};
 
 use crate::grid::Size;
 use crate::pyramid::footprint;
 
-/// One level in single floats: layers one after another, each rows of RGBA texels.
+/// Sums of one level in single floats: layers one after another, each rows of RGBA texels.
 #[derive(Clone)]
 pub(super) struct Sums {
     pub(super) size: Size,

@@ -24,7 +24,7 @@ use crate::observe::{Cancelled, Forward, Observer, Unobserved};
 use crate::pyramid::{Layout, LevelMismatch, Precision, Pyramid, footprint, level_sizes};
 use crate::surface::{Surface, SurfaceRow};
 
-/// Where rows of stored texels belong.
+/// Place of rows of stored texels in the pyramid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
     /// Level, 0 the finest.
@@ -37,13 +37,13 @@ pub struct Place {
 
 /// Takes the stored rows of a bake, in any order of places, each place once.
 pub trait LevelSink {
-    /// What can go wrong while writing.
+    /// Error of writing.
     type Error;
 
     /// Takes whole rows of one layer of one level.
     ///
     /// # Errors
-    /// Whatever the sink meets; the bake stops and hands it on.
+    /// Any error of the sink; the bake stops and hands it on.
     fn write_rows(&mut self, place: Place, bytes: &[u8]) -> Result<(), Self::Error>;
 
     /// All levels, if the sink keeps them in memory; they are then written in place, by all threads.
@@ -88,18 +88,18 @@ pub struct Bake<'a> {
     observer: &'a dyn Observer,
 }
 
-/// Bake that came to no end.
+/// Error of a bake that did not come to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BakeError<E> {
     /// The observer stopped it.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
-    /// The sink could not take what was made.
+    /// The sink could not take rows.
     #[error("{0}")]
     Sink(E),
 }
 
-/// What a bake met on its way.
+/// Report of a bake.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BakeReport {
     /// Channels too large for the precision, which became infinite.
@@ -116,17 +116,17 @@ impl<'a> Bake<'a> {
         Self { surface, method, precision: Precision::Half, attributes: &[], observer: &Unobserved }
     }
 
-    /// The same into channels of this precision.
+    /// Returns it with channels of this precision.
     #[must_use]
     pub fn precision(self, precision: Precision) -> Self {
         Self { precision, ..self }
     }
 
-    /// The same with attributes, other maps of the surface's size: each lobe carries its weight times the
+    /// Returns it with attributes, other maps of the surface's size: each lobe carries its weight times the
     /// mean of their values over its normals, in a further layer an attribute.
     ///
-    /// Baking panics when the method's lobes carry none ([`Describe::carries_attributes`]), or one has
-    /// another size.
+    /// Baking panics when the method's lobes carry no attributes ([`Describe::carries_attributes`]), or an
+    /// attribute has another size.
     ///
     /// [`Describe::carries_attributes`]: crate::ndf::Describe::carries_attributes
     #[must_use]
@@ -134,13 +134,13 @@ impl<'a> Bake<'a> {
         Self { attributes, ..self }
     }
 
-    /// The same for somebody to watch and to stop.
+    /// Returns it with an observer, which watches the bake and may stop it.
     #[must_use]
     pub fn observer(self, observer: &'a dyn Observer) -> Self {
         Self { observer, ..self }
     }
 
-    /// Size, layers and precision of what will come out.
+    /// Layout of the pyramid to be baked: size, layers and precision.
     #[must_use]
     pub fn layout(&self) -> Layout {
         Layout {
@@ -203,6 +203,7 @@ impl<'a> Bake<'a> {
             self.observer
                 .progress(1.0 - 0.1 * (plan.sizes.len() - 1 - level) as f64 / plan.sizes.len() as f64);
         }
+        self.observer.progress(1.0);
         Ok(report)
     }
 
@@ -281,7 +282,7 @@ impl<'a> Bake<'a> {
         let plane = band.0.len() * coarse.width * 4;
         current.clear();
         current.resize(plane * plan.layout.layers, 0.0);
-        // What a band reads may reach one row further than what it writes.
+        // A band may read one row further than it writes.
         for y in written.start..(band.0.end * fine.height).div_ceil(coarse.height) {
             self.surface.read_row(y, row);
             self.method.accumulate_row(row, values);
@@ -402,15 +403,15 @@ fn write_rows<S: LevelSink>(
 /// The stored rows of one level, layer by layer.
 type Stored<'a> = Vec<&'a mut [u8]>;
 
-/// Where a band puts what it makes.
+/// Rows that a band writes to.
 struct BandOutputs<'a> {
-    /// One a level, from 0 to the kept one.
+    /// Stored rows of each level, from 0 to the kept one.
     stored: Vec<Stored<'a>>,
     /// Sums of the kept level, layer by layer.
     kept: Vec<&'a mut [f32]>,
 }
 
-/// What a task needs to itself.
+/// Scratch memory of one task.
 struct Scratch {
     row: SurfaceRow,
     values: Vec<f32>,
@@ -433,7 +434,7 @@ impl Scratch {
     }
 }
 
-/// Scratch memory that tasks hand on: megabytes that need not be asked of the system for every band.
+/// Scratch memory that tasks hand on, so that no band asks the system for megabytes anew.
 #[derive(Default)]
 struct ScratchPool(Mutex<Vec<Scratch>>);
 
@@ -448,7 +449,7 @@ impl ScratchPool {
     }
 }
 
-/// Keeps a bake in memory.
+/// Sink that keeps a bake in memory.
 #[derive(Debug)]
 pub struct MemorySink {
     layout: Layout,
@@ -457,7 +458,7 @@ pub struct MemorySink {
 }
 
 impl MemorySink {
-    /// Room for every level of `layout`.
+    /// Sink with room for every level of `layout`.
     #[must_use]
     pub fn new(layout: Layout) -> Self {
         let sizes = level_sizes(layout.size);

@@ -1,4 +1,4 @@
-//! How a bake is cut up: which levels bands of rows reach, and which rows are whose.
+//! Plan of a bake: the levels that bands of rows reach, and the rows of each band.
 
 use std::ops::Range;
 

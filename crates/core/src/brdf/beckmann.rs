@@ -61,7 +61,8 @@ impl Widen for Beckmann {
 
 impl Lobe for Beckmann {
     fn evaluate(&self, u: f64) -> f64 {
-        // Below 1e-6 the exponential has underflowed for alpha up to 1, and u⁴ is about to for any.
+        // Below 1e-6 the exponential has underflowed for alpha up to 1, and u⁴ is about to underflow for any
+        // alpha.
         if u <= 1e-6 {
             return 0.0;
         }
@@ -73,7 +74,7 @@ impl Lobe for Beckmann {
         Some(SlopeVariance::clamped(self.alpha_squared / 2.0))
     }
 
-    /// The Gaussian that it is.
+    /// Slope profile of Beckmann: the Gaussian itself.
     fn slope_profile(&self, square: f64) -> f64 {
         (-0.5 * square).exp() / (2.0 * PI)
     }
@@ -98,7 +99,7 @@ mod tests {
     #[test]
     fn masking_follows_the_exact_form() {
         // Smith's integral, 1/(1+L), L = (exp(-a²)/(a sqrt pi) - erfc a)/2; Walter et al. state 0.35 % for
-        // theirs.
+        // their form.
         for u in [0.9_f64, 0.5, 0.2, 0.05] {
             for alpha in [0.1_f64, 0.5, 1.0] {
                 let a = u / (alpha * (1.0 - u * u).sqrt());

@@ -10,7 +10,7 @@ fn lobe_widen(base: f32, by: f32) -> f32 {
 
 // D(u), u the cosine between normal and half-vector.
 fn lobe_evaluate(base: f32, u: f32) -> f32 {
-    // Below, the exponential has underflowed for alpha up to 1, and u⁴ is about to for any.
+    // Below, the exponential has underflowed for alpha up to 1, and u⁴ is about to underflow for any alpha.
     if u <= 1e-6 {
         return 0.0;
     }

@@ -8,10 +8,10 @@ fn lobe_widen(base: f32, by: f32) -> f32 {
     return max(base / (1.0 + base * by), 1e-3);
 }
 
-// Natural logarithm to a few 1e-8 of itself, or of 1 if that is more. Devices' own may be off by 5e-7, which
-// an exponent of 50 makes 2e-5.
+// Natural logarithm, to a few 1e-8 of itself, or of 1 if that is more. A device's own may be off by 5e-7, and
+// an exponent of 50 turns that into 2e-5.
 //
-// x = 2^e m with m from 1/2 to 1, and ln m = 2 atanh((m-1)/(m+1)), whose series has left 1e-9 after eight
+// x = 2^e m with m from 1/2 to 1, and ln m = 2 atanh((m-1)/(m+1)), whose series is off by 1e-9 after eight
 // terms.
 fn logarithm(x: f32) -> f32 {
     let bits = bitcast<u32>(x);
@@ -26,8 +26,8 @@ fn logarithm(x: f32) -> f32 {
 
 // f(u), u the cosine between normal and half-vector.
 fn lobe_evaluate(base: f32, u: f32) -> f32 {
-    // Below, any exponent but the least makes nothing of it; and numbers this small have no exponent to take
-    // apart.
+    // Below this the power is nothing for any exponent but the least, and numbers this small have no binary
+    // exponent to take apart.
     if u <= 1e-30 {
         return 0.0;
     }

@@ -1,6 +1,6 @@
-// No highlight: what a diffuse material is linked with in place of a lobe around the half-vector.
+// No highlight: a diffuse material is linked with this in place of a lobe around the half-vector.
 
-// False: the lobe is of the light's direction, and the diffuse part already.
+// False: the lobe is around the light's direction, and is the diffuse part already.
 const SPECULAR: bool = false;
 
 fn lobe_widen(base: f32, by: f32) -> f32 {
@@ -19,7 +19,7 @@ fn lobe_masking(u: f32, width: f32) -> f32 {
     return 1.0;
 }
 
-// Diffuse facets are not without relief: Beckmann's.
+// Diffuse facets have relief too: Beckmann's.
 fn lobe_visible_area(mean: f32, deviation: f32) -> f32 {
     return mean_of_positive_part(mean, deviation * deviation);
 }

@@ -70,12 +70,12 @@ impl Lobe for Ggx {
         (2.0 * PI * (1.0 + 0.5 * square).powi(2)).recip()
     }
 
-    /// The same equation read as an area, which holds for negative means too: slopes seen along a plane are
-    /// Student's t of two degrees.
+    /// Walter et al.'s equation 34 read as an area. It holds for negative means too: slopes seen along a
+    /// plane are Student's t of two degrees.
     fn visible_area(&self, mean: f64, deviation: f64) -> f64 {
         let spread = 2.0 * deviation * deviation;
         let root = (mean * mean + spread).sqrt();
-        // The smaller of the two terms apart, lest they cancel.
+        // For a negative mean, in the form whose two terms do not cancel.
         if mean < 0.0 { spread / (root - mean) / 2.0 } else { (mean + root) / 2.0 }
     }
 

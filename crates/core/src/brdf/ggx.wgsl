@@ -31,11 +31,11 @@ fn lobe_masking(u: f32, width: f32) -> f32 {
     return 2.0 / (1.0 + sqrt(1.0 + 2.0 * width * tan_squared));
 }
 
-// Projected area of the facets that face a direction: the same equation read as an area.
+// Projected area of the facets that face a direction: equation 34 read as an area.
 fn lobe_visible_area(mean: f32, deviation: f32) -> f32 {
     let spread = 2.0 * deviation * deviation;
     let root = sqrt(mean * mean + spread);
-    // The smaller of the two terms apart, lest they cancel.
+    // For a negative mean, in the form whose two terms do not cancel.
     if mean < 0.0 {
         return 0.5 * spread / (root - mean);
     }

@@ -1,8 +1,8 @@
 //! The contract of a lobe: `D`, how microfacets are distributed around a normal, or any other `f(w · n)`.
 //!
 //! Han et al. 2007, section 4: every such lobe acts on a distribution of normals by spherical convolution, so
-//! two facts are all that a method needs of it: its **zonal coefficients**, and how it **widens** when
-//! convolved with an isotropic lobe of normals.
+//! a method needs only two facts about it: its **zonal coefficients**, and how it **widens** when convolved
+//! with an isotropic lobe of normals.
 
 use std::any::Any;
 use std::borrow::Cow;
@@ -44,16 +44,16 @@ pub trait Lobe: LobeObject + Debug + Display + Send + Sync {
         u.iter_mut().for_each(|u| *u = self.evaluate(*u));
     }
 
-    /// Slope variance of the lobe on one axis; `None` for Lambert, which is no narrow lobe.
+    /// Slope variance of the lobe on one axis; `None` for Lambert, whose lobe is not narrow.
     fn slope_variance(&self) -> Option<SlopeVariance>;
 
     /// Smith's masking (Walter et al. 2007, section 5.1) at cosine `u > 0` to the normal, of a lobe of this
-    /// kind that is `width` wide; Beckmann's, where a lobe has none of its own.
+    /// kind that is `width` wide. Lobes without a form of their own use Beckmann's.
     fn masking(&self, u: f64, width: SlopeVariance) -> f64 {
         beckmann::masking(u, width)
     }
 
-    /// Colour of the lobe itself, at the cosine u = wi·wh; white, but for what was measured.
+    /// Colour of the lobe itself, at the cosine u = wi·wh; white, except for measured lobes.
     fn tint(&self, _u: f64) -> DVec3 {
         DVec3::ONE
     }
@@ -63,37 +63,37 @@ pub trait Lobe: LobeObject + Debug + Display + Send + Sync {
         None
     }
 
-    /// The microfacets whose blur of an environment is most like this lobe's.
+    /// Microfacets that blur an environment most like this lobe.
     fn microfacets(&self) -> Microfacets {
         Microfacets::Beckmann
     }
 
-    /// The microfacets of a lobe that is none: Beckmann's, as wide as it; `None` for lobes of microfacets,
-    /// and for Lambert.
+    /// Beckmann microfacets as wide as this lobe, for a lobe that is no distribution of microfacets itself;
+    /// `None` for lobes that are one, and for Lambert.
     fn as_beckmann(&self) -> Option<Beckmann> {
         self.slope_variance().map(Beckmann::of_width)
     }
 
     /// Density of facets over slopes, in units of the lobe's own deviations: D(u) u⁴ times its variance, at a
-    /// slope of this squared length. Not through u where a lobe is a function of slopes: near 1, u has few of
-    /// their digits.
+    /// slope of this squared length. A lobe that is a function of slopes computes it without u, which near 1
+    /// has few of their digits.
     fn slope_profile(&self, square: f64) -> f64 {
         let variance = self.slope_variance().unwrap_or(SlopeVariance::ZERO).get();
         let u2 = 1.0 / (1.0 + variance * square);
         self.evaluate(u2.sqrt()) * u2 * u2 * variance
     }
 
-    /// Area, projected along a direction, of the facets that face it: the mean of `max(X, 0)` for X of this
-    /// mean and deviation, X being distributed as slopes are for lobes of this kind. Beckmann's Gaussian,
-    /// where a lobe has none of its own. Per unit of area that the facets cover, and masking apart:
-    /// [`Self::masking`] is the mean over this.
+    /// Area of the facets that face a direction, projected along it: the mean of `max(X, 0)` for X of this
+    /// mean and deviation. X is distributed as the slopes of lobes of this kind; as Beckmann's Gaussian,
+    /// where a lobe has no distribution of its own. The area is per unit of area that the facets cover,
+    /// without masking: [`Self::masking`] is the mean over this.
     fn visible_area(&self, mean: f64, deviation: f64) -> f64 {
         mean_of_positive_part(mean, deviation * deviation)
     }
 
     /// Zonal coefficients `rho_l = 2 pi ∫ f(u) P_l(u) du` for l = 0..`order` (Han et al., equation 8).
     ///
-    /// Closed forms or recurrences where there are any; else [`zonal_by_quadrature`].
+    /// By closed form or recurrence where there is one; else by [`zonal_by_quadrature`].
     fn zonal(&self, order: usize) -> Vec<f64> {
         zonal_by_quadrature(self, order)
     }
@@ -105,13 +105,13 @@ pub trait Lobe: LobeObject + Debug + Display + Send + Sync {
     /// The one number, `base`, that the twin's functions take for this lobe.
     fn base(&self) -> f64;
 
-    /// The approximation that Han et al. print for the zonal coefficients, if they do.
+    /// The approximation that Han et al. print for the zonal coefficients, if they print one.
     fn zonal_as_printed(&self, _order: usize) -> Option<Vec<f64>> {
         None
     }
 }
 
-/// How a kind of lobe widens.
+/// Widening of a kind of lobe.
 pub trait Widen: Lobe + Sized {
     /// This lobe convolved with an isotropic lobe of normals of variance `by`; exactly itself for zero.
     #[must_use]
@@ -123,19 +123,19 @@ pub trait Widen: Lobe + Sized {
     }
 }
 
-/// The part of [`Lobe`] that every kind has by its [`Widen`].
+/// Part of [`Lobe`] that every kind gets from its [`Widen`].
 pub trait LobeObject {
     /// This lobe convolved with an isotropic lobe of normals of variance `by`; exactly itself for zero.
     fn widen(&self, by: SlopeVariance) -> AnyLobe;
 
-    /// [`Self::widen`], then [`Lobe::evaluate`], without a lobe on the heap: what a pixel asks of a lobe,
-    /// once.
+    /// [`Self::widen`], then [`Lobe::evaluate`], without a lobe on the heap: for a pixel, which asks this of
+    /// a lobe once.
     fn evaluate_widened(&self, by: SlopeVariance, u: f64) -> f64;
 
     /// True for a lobe of the same kind and width.
     fn equals(&self, other: &dyn Lobe) -> bool;
 
-    /// The lobe as what it is.
+    /// The lobe as `Any`, to be cast down to its own type.
     fn as_any(&self) -> &dyn Any;
 }
 
@@ -163,8 +163,8 @@ impl PartialEq for dyn Lobe {
     }
 }
 
-/// Lobe of any kind, shared: cloned for nothing, compared by kind and width, read from and written as its
-/// spelling.
+/// Lobe of any kind, shared. Cloning costs nothing. Lobes compare by kind and width, and are read from and
+/// written as their spelling.
 #[derive(Clone)]
 pub struct AnyLobe(Arc<dyn Lobe>);
 
@@ -224,7 +224,7 @@ pub fn zonal_by_quadrature<B: Lobe + ?Sized>(lobe: &B, order: usize) -> Vec<f64>
     rho
 }
 
-/// Twins in WGSL of the default methods of [`Lobe`], for lobes to be put together from.
+/// Twins in WGSL of the default methods of [`Lobe`], from which the shaders of lobes are put together.
 pub(super) mod twin {
     /// Masking and projected area of Gaussian slopes.
     pub(in crate::brdf) const GAUSSIAN_FACETS: &str = include_str!("gaussian_facets.wgsl");

@@ -1,4 +1,4 @@
-//! Distributions of microfacets in closed form: `D` and its inverse, for whoever samples or blurs by them.
+//! Distributions of microfacets in closed form: `D` and its inverse, for sampling and blurring.
 
 use std::f64::consts::PI;
 
@@ -13,7 +13,7 @@ pub enum Microfacets {
 
 impl Microfacets {
     /// `D`: area of facets per solid angle of their normals, per unit of macro-surface area, at the angle to
-    /// the normal of this squared cosine and squared sine. Both come apart, since near the normal `1 - cos²`
+    /// the normal of this squared cosine and squared sine. Both are passed, since near the normal `1 - cos²`
     /// has few digits left.
     #[must_use]
     pub fn d(self, alpha_squared: f64, cos_squared: f64, sin_squared: f64) -> f64 {

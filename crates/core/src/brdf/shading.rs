@@ -1,9 +1,9 @@
-//! How a surface answers a light: a lobe, what multiplies it, and a diffuse part. The shading models of the
-//! papers.
+//! Shading models of the papers: how a surface answers a light, by a lobe, what multiplies it, and a diffuse
+//! part.
 //!
 //! Light sent to the eye by one normal, per unit of irradiance on a plane that faces the light: `F(u) f(wh·n)
-//! c(n) + share(F) albedo max(wi·n, 0)/pi`, with u = wi·wh. The factor c is what sets the models apart; it
-//! varies slowly with n, while f is narrow, and that is what makes filtering possible (`ndf/reflect.rs`).
+//! c(n) + share(F) albedo max(wi·n, 0)/pi`, with u = wi·wh. The factor c sets the models apart. It varies
+//! slowly with n, while f is narrow, and that makes filtering possible (`ndf/reflect.rs`).
 
 use std::f64::consts::PI;
 
@@ -13,7 +13,7 @@ use crate::brdf::{AnyLobe, Argument};
 use crate::units::SlopeVariance;
 use crate::words;
 
-/// Which factor and which Fresnel term go with the lobe.
+/// Shading model: the factor and the Fresnel term that go with a lobe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShadingModel {
     /// Tan et al. 2005, section 3, a Cook-Torrance model without attenuation: `c = 1/(n·wo)`, Schlick's F,
@@ -25,7 +25,7 @@ pub enum ShadingModel {
     /// Walter et al. 2007, equation 20: `c = G/(4 n·wo)`, G Smith's for the lobe's own width, Schlick's F.
     Smith,
     /// Dupuy et al. 2013 without shadowing: `c = 1/(4 n·wo (1 + Lambda(wo)))`, Schlick's F. Facets hide each
-    /// other from the eye, and from no light.
+    /// other from the eye, but not from the light.
     Masked,
     /// Dupuy et al. 2013 in full: `c = 1/(4 n·wo (1 + Lambda(wo) + Lambda(wi)))`, Schlick's F.
     Shadowed,
@@ -38,13 +38,13 @@ pub const LEAST_COSINE: f64 = 0.05;
 words!(ShadingModel { Tan => "tan", Han => "han", Smith => "smith", Masked => "masked", Shadowed => "shadowed" });
 
 impl ShadingModel {
-    /// Its number in shaders.
+    /// Number of the model in shaders.
     #[must_use]
     pub fn index(self) -> u32 {
         self as u32
     }
 
-    /// The Fresnel term: Schlick's, from the reflectance at normal incidence; for Han et al. that colour
+    /// The Fresnel term: Schlick's, from the reflectance at normal incidence; for Han et al. that reflectance
     /// itself.
     #[must_use]
     pub fn fresnel(self, specular: DVec3, u: f64) -> DVec3 {
@@ -54,7 +54,7 @@ impl ShadingModel {
         }
     }
 
-    /// What is left for the diffuse part.
+    /// Share that is left for the diffuse part.
     #[must_use]
     pub fn diffuse_share(self, fresnel: DVec3) -> DVec3 {
         match self {
@@ -67,9 +67,9 @@ impl ShadingModel {
 /// A path from light to eye, in the tangent frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Directions {
-    /// To the light.
+    /// Unit vector to the light.
     pub wi: DVec3,
-    /// To the eye.
+    /// Unit vector to the eye.
     pub wo: DVec3,
     /// Half-vector.
     pub wh: DVec3,
@@ -85,8 +85,8 @@ impl Directions {
         if wi.z <= 0.0 || wo.z <= 0.0 { None } else { Self::between(wi, wo) }
     }
 
-    /// The path between two unit vectors, be they below the base surface: displaced facets may face them
-    /// still. `None` only for a light right behind what is seen, which has no half-vector.
+    /// The path between two unit vectors, even below the base surface: displaced facets may still face them.
+    /// `None` only for a light right behind what is seen, which has no half-vector.
     #[must_use]
     pub fn between(wi: DVec3, wo: DVec3) -> Option<Self> {
         let wh = (wi + wo).try_normalize()?;
@@ -94,23 +94,23 @@ impl Directions {
     }
 }
 
-/// What a place is made of, apart from its normals.
+/// Surface parameters of a place: its material, apart from its normals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceParams {
     /// Diffuse albedo, linear RGB.
     pub diffuse: DVec3,
     /// Reflectance at normal incidence, or Han et al.'s `K_s`; linear RGB.
     pub specular: DVec3,
-    /// What widens the lobe here, as a roughness map says.
+    /// Slope variance that a roughness map adds to the lobe's own here.
     pub roughness: SlopeVariance,
 }
 
-/// A lobe in a model: everything about a material that does not change over its surface.
+/// A lobe in a shading model: everything about a material that does not change over its surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Brdf {
-    /// The lobe, where it is sharpest. Lambert leaves the diffuse part alone.
+    /// The lobe, where it is sharpest. With Lambert there is only the diffuse part.
     pub lobe: AnyLobe,
-    /// Its model.
+    /// Shading model.
     pub shading: ShadingModel,
 }
 
@@ -133,13 +133,13 @@ impl Brdf {
         self.lobe.tint(u) * self.shading.fresnel(specular, u)
     }
 
-    /// False for a lobe of the light's direction, which is the diffuse part already.
+    /// False for a lobe around the light's direction, which is the diffuse part already.
     #[must_use]
     pub fn is_specular(&self) -> bool {
         self.lobe.argument() == Argument::Half
     }
 
-    /// The factor c at a normal, for the lobe that the roughness makes.
+    /// The factor c at a normal, for the lobe at this roughness.
     #[must_use]
     pub fn factor(&self, n: DVec3, directions: &Directions, roughness: SlopeVariance) -> f64 {
         let (i, o) = (n.dot(directions.wi), n.dot(directions.wo));
@@ -161,13 +161,13 @@ impl Brdf {
         }
     }
 
-    /// Projected area of what a facet is made of, as it faces a direction at this cosine.
+    /// Projected area of the microfacets that make up a facet, towards a direction at this cosine to it.
     fn visible_area(&self, cosine: f64, roughness: SlopeVariance) -> f64 {
         let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
         self.lobe.visible_area(cosine, sine * self.width(roughness).get().sqrt())
     }
 
-    /// Light that one normal sends along the way, per unit of irradiance.
+    /// Light that one normal sends along the path, per unit of irradiance.
     #[must_use]
     pub fn facet(&self, n: DVec3, params: &SurfaceParams, directions: &Directions) -> DVec3 {
         let fresnel = self.shading.fresnel(params.specular, directions.u);
@@ -208,8 +208,8 @@ mod tests {
         let tan = f * d / o + (1.0 - f) * 0.5 * i / PI;
         let han = (0.04 * d + 0.5 / PI) * i;
         assert!((of(ShadingModel::Tan) - tan).abs() < 1e-14 && (of(ShadingModel::Han) - han).abs() < 1e-14);
-        // At alpha 0.3 neither direction is steep enough for Walter's form to leave 1, whose exact value it
-        // then is to 4e-4.
+        // At alpha 0.3 neither direction is steep enough for Walter's form to leave 1, which is then the
+        // exact value to 4e-4.
         let smith = f * d / (4.0 * o) + (1.0 - f) * 0.5 * i / PI;
         assert!((of(ShadingModel::Smith) - smith).abs() < 1e-14);
     }

@@ -1,4 +1,5 @@
-// How a surface answers a light: a lobe, what multiplies it, and a diffuse part. Twin of shading.rs.
+// Shading models, how a surface answers a light: a lobe, what multiplies it, and a diffuse part. Twin of
+// shading.rs.
 
 const PI: f32 = 3.14159265358979;
 
@@ -14,9 +15,9 @@ const LEAST_COSINE: f32 = 0.05;
 
 // A path from light to eye, in the tangent frame.
 struct Directions {
-    // To the light.
+    // Unit vector to the light.
     wi: vec3<f32>,
-    // To the eye.
+    // Unit vector to the eye.
     wo: vec3<f32>,
     // Half-vector.
     wh: vec3<f32>,
@@ -24,11 +25,11 @@ struct Directions {
     u: f32,
 }
 
-// What a place is made of, apart from its normals.
+// Surface parameters of a place: its material, apart from its normals.
 struct SurfaceParams {
     // Diffuse albedo, linear RGB.
     diffuse: vec3<f32>,
-    // What widens the lobe here: a slope variance.
+    // Slope variance that widens the lobe here.
     roughness: f32,
     // Reflectance at normal incidence; linear RGB.
     specular: vec3<f32>,
@@ -36,7 +37,7 @@ struct SurfaceParams {
 
 alias Table = array<vec4<f32>, 3 * TABLE>;
 
-// A lobe in a model: everything about a material that does not change over its surface.
+// A lobe in a shading model: everything about a material that does not change over its surface.
 struct Brdf {
     // The lobe's own number; see its file.
     base: f32,
@@ -44,17 +45,18 @@ struct Brdf {
     shading: u32,
     // 1: factors are taken at the lobes' means, as the papers print it.
     at_means: u32,
-    // The least roughness that `table` is made for, and how much more the most is.
+    // Least roughness that `table` is made for, and the span from it to the most.
     roughness: f32,
     span: f32,
-    // What the method wants to know of the lobe, entry by entry, three of these each: at eleven roughnesses,
-    // and of the diffuse lobe.
+    // The method's numbers for the lobe, entry by entry, three of these each: at eleven roughnesses, and for
+    // the diffuse lobe.
     table: Table,
 }
 
-// An entry of the table at any roughness: between two that it has, by equal steps of the root, each carried
-// on as heat spreads on a sphere, at the rate `decay`. `range` is the least roughness and the span. (The
-// table comes by pointer: copied for every entry, it is what time goes into.)
+// Entry of the table at any roughness, mixed from those at the two roughnesses around it. The table's
+// roughnesses are equal steps of the root. Each entry is first carried on to this roughness, as heat spreads
+// on a sphere, at the rate `decay`. `range` is the least roughness and the span. (The table comes by pointer:
+// copying it for every entry would take most of the time.)
 fn tabulated(table: ptr<function, Table>, range: vec2<f32>, entry: u32, roughness: f32, decay: f32) -> f32 {
     if range.y <= 0.0 {
         return (*table)[3u * entry].x;
@@ -90,7 +92,7 @@ fn fresnel(shading: u32, specular: vec3<f32>, u: f32) -> vec3<f32> {
     return specular + (1.0 - specular) * (x2 * x2 * x);
 }
 
-// What is left for the diffuse part.
+// Share that is left for the diffuse part.
 fn diffuse_share(shading: u32, fresnel: vec3<f32>) -> vec3<f32> {
     return select(1.0 - fresnel, vec3<f32>(1.0), shading == HAN);
 }
@@ -100,12 +102,12 @@ fn brdf_width(brdf: Brdf, roughness: f32) -> f32 {
     return lobe_variance(brdf.base) + roughness;
 }
 
-// Projected area of what a facet is made of, as it faces a direction at this cosine.
+// Projected area of the microfacets that make up a facet, towards a direction at this cosine to it.
 fn visible_area(width: f32, cosine: f32) -> f32 {
     return lobe_visible_area(cosine, sqrt(max(1.0 - cosine * cosine, 0.0) * width));
 }
 
-// The factor c at a normal, for the lobe that the roughness makes.
+// The factor c at a normal, for the lobe at this roughness.
 fn factor(brdf: Brdf, n: vec3<f32>, directions: Directions, roughness: f32) -> f32 {
     let i = dot(n, directions.wi);
     let o = dot(n, directions.wo);
@@ -129,7 +131,7 @@ fn factor(brdf: Brdf, n: vec3<f32>, directions: Directions, roughness: f32) -> f
     return lobe_masking(i, width) * lobe_masking(o, width) / (4.0 * o);
 }
 
-// Light that one normal sends along the way, per unit of irradiance.
+// Light that one normal sends along the path, per unit of irradiance.
 fn facet(brdf: Brdf, n: vec3<f32>, params: SurfaceParams, directions: Directions) -> vec3<f32> {
     let lambert = params.diffuse * (max(dot(n, directions.wi), 0.0) / PI);
     if !SPECULAR {

@@ -1,4 +1,4 @@
-// The slope profile of a lobe that is no function of slopes. Twin of `slope_profile` in lobe.rs.
+// Slope profile of a lobe that is not a function of slopes. Twin of `slope_profile` in lobe.rs.
 
 // `P22` in units of the lobe's own deviation, at a slope of this squared length: D u⁴ times the variance.
 fn lobe_slope_profile(base: f32, square: f32) -> f32 {

@@ -8,9 +8,9 @@ use super::{AnyLobe, beckmann, blinn_phong, ggx, lambert, measured, torrance_spa
 pub struct Row {
     /// The word before the colon.
     pub name: &'static str,
-    /// What follows it, for help: `:S`, `:ALPHA` or nothing.
+    /// Parameter that follows the name, for help: `:S`, `:ALPHA` or nothing.
     pub parameter: &'static str,
-    /// One line for help and docs.
+    /// Summary in one line, for help and docs.
     pub summary: &'static str,
     /// Reads the parameter.
     pub parse: fn(&str) -> Result<AnyLobe, String>,
@@ -39,9 +39,9 @@ pub enum ParseLobeError {
     /// The parameter is missing, superfluous or out of range.
     #[error("BRDF `{spelling}`: {reason}")]
     Parameter {
-        /// What was written.
+        /// Spelling as it was written.
         spelling: String,
-        /// What is wrong.
+        /// Reason why it is wrong.
         reason: String,
     },
 }

@@ -13,7 +13,7 @@ fn lobe_widen(base: f32, by: f32) -> f32 {
 // and none near 1.
 //
 // From a quarter of the angle, b, sin²b = t: b² = asin²(sqrt t) = 1/2 sum (4t)^n / (n² binomial(2n, n)), t <
-// 0.15, where eight terms leave 1e-8.
+// 0.15, where eight terms leave an error of 1e-8.
 fn squared_angle(u: f32) -> f32 {
     let half = (1.0 - u) / 2.0;
     let t = half / (2.0 * (1.0 + sqrt(1.0 - half)));

@@ -1,4 +1,4 @@
-// The colour of a lobe that has none of its own. Twin of `tint` in mod.rs.
+// Colour of a lobe without one of its own. Twin of `tint` in lobe.rs.
 
 // White, whatever u = wi·wh.
 fn lobe_tint(u: f32) -> vec3<f32> {

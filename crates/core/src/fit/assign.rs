@@ -1,5 +1,6 @@
-//! The E-step and the sums of the M-step in one: each sample is shared out among the lobes, and what every
-//! lobe got is added up. With the look-ups of `refine.rs`, the inner loop of everything that is fitted.
+//! The E-step and the sums of the M-step in one: each sample is shared out among the lobes, and the shares of
+//! every lobe are added up. With the look-ups of `refine.rs`, this is the inner loop of everything that is
+//! fitted.
 
 use std::ops::Range;
 

@@ -2,8 +2,8 @@
 //!
 //! Han et al. 2007, section 6.3, and Tan et al. 2005, section 4.2, visit texels in scanline order. Here the
 //! texels of a level are visited in four passes, like the squares of a board with four colours: a texel sees
-//! its parent and those of its eight neighbours that an earlier pass has fitted. That is as coherent, and
-//! parallel.
+//! its parent and those of its eight neighbours that an earlier pass has fitted. This is as coherent, and
+//! runs in parallel.
 
 use rayon::prelude::*;
 
@@ -17,7 +17,7 @@ use crate::surface::Wraps;
 /// Strength of the prior: `c` of Tan et al. and `C` of Han et al., 1 in both.
 const STRENGTH: f32 = 1.0;
 
-/// What the prior of a level looks at, besides the level itself.
+/// Context of a level's prior: all that it looks at besides the level itself.
 pub(crate) struct PriorContext<'a, const N: usize> {
     pub(super) grid: &'a SampleGrid<N>,
     pub(super) parent: &'a Level<N>,
@@ -27,7 +27,7 @@ pub(crate) struct PriorContext<'a, const N: usize> {
     pub(super) finest: usize,
 }
 
-/// Which of the four passes visits a texel.
+/// Number of the pass, of four, that visits a texel.
 fn pass_of((x, y): (usize, usize)) -> usize {
     (x & 1) + 2 * (y & 1)
 }

@@ -1,4 +1,4 @@
-//! Plain expectation maximisation of one texel, and where it starts.
+//! Plain expectation maximisation of one texel, and its starts.
 
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
@@ -7,7 +7,7 @@ use super::assign::{MAX_LOBES, assign, shares};
 use super::family::Family;
 use super::samples::Samples;
 
-/// Rounds of EM from these sums, which end as those of the last M-step.
+/// Runs rounds of EM from these sums, which end as those of the last M-step.
 pub(crate) fn iterate<const N: usize>(
     family: impl Family<N>,
     samples: &Samples<N>,
@@ -77,8 +77,8 @@ fn pick<const N: usize>(points: &Samples<N>, seeds: &mut [[f32; N]], mut next: i
     }
 }
 
-/// Seeds each furthest from all before it (Hochbaum and Shmoys 1985, as in Han et al. 2007, section 6.2), and
-/// `sums` of the samples nearest to each.
+/// Picks seeds, each furthest from all before it (Hochbaum and Shmoys 1985, as in Han et al. 2007, section
+/// 6.2), and sets `sums` to those of the samples nearest to each.
 pub(crate) fn start_from_furthest<const N: usize>(
     points: &Samples<N>,
     samples: &Samples<N>,

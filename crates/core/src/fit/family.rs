@@ -30,11 +30,12 @@ const NOWHERE: f32 = -60.0;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Shape {
     pub(crate) alpha: f32,
-    /// On the sphere a unit vector, in the plane `(x, y, 0)`.
+    /// Mean: on the sphere a unit vector, in the plane `(x, y, 0)`.
     pub(crate) mean: [f32; 3],
-    /// On one axis: `1/kappa` on the sphere.
+    /// Variance on one axis: `1/kappa` on the sphere.
     pub(crate) variance: f32,
-    /// On the sphere `|r|`, which follows from the variance and is dear to work out; in the plane not used.
+    /// Length `|r|` of the mean on the sphere, which follows from the variance and is costly to work out; not
+    /// used in the plane.
     pub(crate) length: f32,
 }
 
@@ -63,8 +64,8 @@ pub(crate) fn log_density<const N: usize>(theta: &[f32; N], t: &[f32; N]) -> f32
 
 /// Exponential family of lobes with N statistics, the first of them one.
 ///
-/// Sums are the weight, then N - 1 statistics times the weight. [`Isotropic`] makes one of four of whatever
-/// has a mean and one variance.
+/// Sums are the weight, then N - 1 statistics times the weight. [`Isotropic`] makes a family of four
+/// statistics from any lobe with a mean and one variance.
 pub(crate) trait Family<const N: usize>: Copy + Send + Sync {
     /// `(1, T(n))`.
     fn statistics(self, n: Vec3) -> [f32; N];
@@ -78,8 +79,8 @@ pub(crate) trait Family<const N: usize>: Copy + Send + Sync {
     /// Variance of the lobe with these sums, on one axis.
     fn width(self, sums: &[f32; N]) -> f32;
 
-    /// Moves the lobes of a level towards the least error that is seen; nothing, for a family that knows no
-    /// way.
+    /// Moves the lobes of a level towards the least error that is seen; does nothing for a family that
+    /// cannot.
     fn refine(self, _grid: &SampleGrid<N>, _level: &mut LevelLobes<'_, N>, _rounds: usize) {}
 
     /// EM with the papers' prior for the texels of a level; plain EM, for a family that has no prior.
@@ -121,7 +122,8 @@ pub(crate) trait Isotropic: Copy + Send + Sync {
     /// weight `weight`, by `strength`; `count` is the number of normals under the texel.
     fn with_prior(self, sums: &[f32; 4], pull: &Pull) -> [f32; 4];
 
-    /// Sums of a shape as they are stored: a lobe that ended at the least variance has none that can be told.
+    /// Sums of a shape as they are stored: a lobe that ended at the least variance is stored with variance 0,
+    /// since its own cannot be told.
     fn settle(self, shape: &Shape) -> [f32; 4] {
         // Through single-precision sums it comes back with an error of about 1 %.
         if shape.variance > 1.05 * LEAST_VARIANCE {
@@ -165,7 +167,7 @@ impl<F: Isotropic> Family<4> for F {
     }
 }
 
-/// What a prior draws a lobe towards.
+/// Pull of a prior: the neighbours that it draws a lobe towards.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pull {
     /// `Σ alpha_k` of the neighbours.
@@ -199,7 +201,7 @@ fn variance_of_length(r: f32) -> f32 {
     (1.0 - r * r) / (r * (3.0 - r * r))
 }
 
-/// Its derivative.
+/// Derivative of `variance_of_length`.
 fn variance_slope(r: f32) -> f32 {
     let (n, d) = (1.0 - r * r, 3.0 * r - r * r * r);
     (-2.0 * r * d - n * (3.0 - 3.0 * r * r)) / (d * d)
@@ -320,8 +322,7 @@ impl Isotropic for Planar {
     }
 
     fn shape(self, alpha: f32, [x, y, _]: [f32; 3], variance: f32) -> Shape {
-        // Beyond the unit disk there are no normals; a little outside is where a mean of a rounded rim may
-        // lie.
+        // Beyond the unit disk there are no normals; but a mean of a rounded rim may lie a little outside.
         let mean = [x.clamp(-1.1, 1.1), y.clamp(-1.1, 1.1), 0.0];
         Shape { alpha, mean, variance: variance.clamp(LEAST_VARIANCE, MOST_VARIANCE), length: 1.0 }
     }

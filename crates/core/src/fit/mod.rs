@@ -74,7 +74,7 @@ impl LobeKind {
     }
 }
 
-/// How lobes of neighbouring texels are made to correspond.
+/// Alignment: the way in which lobes of neighbouring texels are made to correspond.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Alignment {
     /// Started from the parent, then moved towards the least error at texels and between them: ours.
@@ -98,27 +98,27 @@ words!(Alignment {
     Unaligned => "unaligned",
 });
 
-/// What is to be fitted.
+/// Fit to be made: kind, number and alignment of the lobes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fit {
     /// The shape of the lobes.
     pub kind: LobeKind,
     /// Lobes a texel, 1 to [`MAX_LOBES`].
     pub lobes: usize,
-    /// How they are aligned.
+    /// Alignment of the lobes.
     pub alignment: Alignment,
 }
 
 /// Value of an attribute, four channels.
 pub type Rgba = [f32; 4];
 
-/// What it is fitted to.
+/// Fit job: the maps that lobes are fitted to.
 pub struct FitJob<'a> {
     /// The finest level.
     pub surface: &'a dyn Surface,
     /// Other maps of the same size whose values each lobe is to carry.
     pub attributes: &'a [Grid<Rgba>],
-    /// Who watches.
+    /// Observer of the fit.
     pub observer: &'a dyn Observer,
 }
 
@@ -126,9 +126,9 @@ pub struct FitJob<'a> {
 pub struct FittedRows<'a> {
     /// Level, 0 the finest.
     pub level: usize,
-    /// Its size.
+    /// Size of the level.
     pub size: Size,
-    /// Which of its rows.
+    /// Rows of the level.
     pub rows: Range<usize>,
     /// Sums of a lobe: its weight, then its other statistics.
     pub statistics: usize,
@@ -202,7 +202,7 @@ struct Fitter<'a, F, const N: usize> {
     samplings: Samplings<N>,
 }
 
-/// One level whose sums are known.
+/// Level whose sums are known.
 pub(crate) struct Level<const N: usize> {
     size: Size,
     sums: Vec<[f32; N]>,
@@ -219,8 +219,7 @@ impl<const N: usize> Level<N> {
         &self.sums[self.index_over(finer, (x, y)) * lobes..][..lobes]
     }
 
-    /// `theta` of every lobe of some rows, in place of their sums: what is asked of a parent by several
-    /// children.
+    /// `theta` of every lobe of some rows, in place of their sums: several children ask a parent for them.
     fn thetas(&self, family: impl Family<N>, lobes: usize, rows: Range<usize>) -> Vec<[f32; N]> {
         let line = self.size.width * lobes;
         self.sums[rows.start * line..rows.end * line].par_iter().map(|sums| family.natural(sums)).collect()
@@ -285,9 +284,9 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
         Level { size, sums: vec![[0.0; N]; size.area() * self.fit.lobes] }
     }
 
-    /// Every level above the finest, each texel by itself: the likeliest that EM finds from the normals
-    /// furthest apart, from the furthest of the lobes of the finer texels below it, and from seeds drawn at
-    /// random.
+    /// Fits every level above the finest, each texel by itself: takes the likeliest lobes that EM finds from
+    /// the normals furthest apart, from the furthest of the lobes of the finer texels below it, and from
+    /// seeds drawn at random.
     fn alone(&self) -> Result<Vec<Level<N>>, Cancelled> {
         let lobes = self.fit.lobes;
         let mut levels = vec![Level { size: self.sizes[0], sums: Vec::new() }];
@@ -378,9 +377,9 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
     /// The start of the coarsest texel, which all others inherit: of several, the one whose lobes are
     /// narrowest.
     ///
-    /// Not the likeliest, nor the one of least error there: what the levels below need is lobes that divide
-    /// the normals well, as in k-means, and that measured better on both counts. For the same reason EM stays
-    /// short.
+    /// This is not the likeliest, nor the one of least error there. The levels below need lobes that divide
+    /// the normals well, as in k-means, and this start measured better on both counts. For the same reason EM
+    /// stays short.
     fn start(&self, samples: &Samples<N>, sums: &mut [[f32; N]]) {
         start_from_furthest(samples, samples, sums);
         let mut least = f32::MAX;
@@ -445,7 +444,7 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
                     }
                 }
                 for ((carried, sums), weight) in carried.iter_mut().zip(sums).zip(weights) {
-                    // A lobe that refinement moved to where no normal is has none to ask: it carries the
+                    // A lobe that refinement moved away from all normals has none to ask: it carries the
                     // texel's mean.
                     let own =
                         if weight > LEAST_WEIGHT * LEAST_WEIGHT { carried.map(|c| c / weight) } else { mean };

@@ -1,11 +1,11 @@
 //! Peaks: a few Phong lobes by non-linear least squares. Fournier 1992, "Normal Distribution Functions and
 //! Multiple Surfaces", as Tan et al. 2005 and Han et al. 2007 compare with it.
 //!
-//! What is fitted is the texel's effective lobe under Blinn-Phong of exponent [`PROBE_EXPONENT`], a sharp
-//! enough look at its normals that is still smooth: the sum of peaks, each `weight (s'+1)/(2 pi) (w·d)^{s'}`,
-//! `s' = s PROBE_EXPONENT/(s + PROBE_EXPONENT)`, against the mean over the normals, at a grid of directions
-//! around them. It starts from EM's lobes, and weights are brought to sum to one at the end, so that energy
-//! is kept.
+//! The fit is to the texel's effective lobe under Blinn-Phong of exponent [`PROBE_EXPONENT`], a sharp enough
+//! look at its normals that is still smooth. It compares the sum of peaks, each
+//! `weight (s'+1)/(2 pi) (w·d)^{s'}`, `s' = s PROBE_EXPONENT/(s + PROBE_EXPONENT)`, with the mean over the
+//! normals, at a grid of directions around them. It starts from EM's lobes, and weights are brought to sum
+//! to one at the end, so that energy is kept.
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::storage::Owned;
@@ -29,7 +29,7 @@ pub const SHARPEST: f32 = 6e4;
 /// Directions a side of the grid on which a texel is fitted.
 const SIDE: usize = 12;
 
-/// How far the grid reaches beyond the normals, in `w.xy`: two deviations of the lobe they are seen through.
+/// Reach of the grid beyond the normals, in `w.xy`: two deviations of the lobe they are seen through.
 const MARGIN: f32 = 0.2;
 
 /// Spread `1 - |r|²` below which a texel is one direction.

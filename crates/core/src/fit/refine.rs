@@ -31,11 +31,11 @@ use crate::grid::Size;
 /// more the other way round.
 const LOBE_VARIANCE: f32 = 0.007;
 
-/// What windows count for, against 1 - this for texels.
+/// Weight of windows, against 1 - this for texels.
 const WINDOW_WEIGHT: f32 = 0.2;
 
-/// Step taken, of one that a bound on the curvature makes safe (the bound is loose), and share of the last
-/// step taken again.
+/// Step taken, in units of one that a bound on the curvature makes safe (the bound is loose), and the share
+/// of the last step that is taken again.
 const STEP: f32 = 1.4;
 const MOMENTUM: f32 = 0.5;
 
@@ -86,8 +86,8 @@ pub(crate) struct LevelLobes<'a, const N: usize> {
     pub(crate) sums: &'a mut [[f32; N]],
 }
 
-/// `0..n` in twos, beginning at `offset`; across the edge where that leaves none alone, else the odd ones are
-/// alone.
+/// `0..n` in twos, beginning at `offset`; pairs go across the edge where that leaves none alone, else the odd
+/// ones stay alone.
 fn pairs(n: usize, offset: usize) -> Vec<Vec<usize>> {
     if n == 1 {
         return vec![vec![0]];
@@ -230,7 +230,7 @@ fn slope(family: impl Isotropic, shapes: &[Shape], seen: &[[f32; 4]], out: &mut 
     }
 }
 
-/// How much of the squared error's curvature at a lobe comes from all lobes, against itself: at least 1.
+/// Curvature of the squared error at a lobe, from all lobes over from itself alone: at least 1.
 fn crowding(lobes: &[Moving], shape: &Shape) -> f32 {
     let near = |other: &Moving| {
         let v = shape.variance + other.shape.variance + 2.0 * LOBE_VARIANCE;

@@ -67,12 +67,12 @@ pub(crate) struct SampleGrid<const N: usize> {
     /// Cells, and samples in each.
     cells: Size,
     per_cell: usize,
-    /// As in [`Samples`]; the first plane is empty when every sample weighs 1.
+    /// Planes as in [`Samples`]; the first one is empty when every sample weighs 1.
     planes: [Vec<f32>; N],
 }
 
 impl<const N: usize> SampleGrid<N> {
-    /// One sample a fine texel.
+    /// Grid with one sample for each fine texel.
     pub(crate) fn finest(family: impl Family<N>, surface: &dyn Surface) -> Self {
         let cells = surface.size();
         let row = |y: usize, row: &mut SurfaceRow| {
@@ -109,7 +109,7 @@ impl<const N: usize> SampleGrid<N> {
         let [weights, statistics @ ..] = out.planes.as_mut_slice() else {
             unreachable!("the first is the weight")
         };
-        // Where cells fill the texel they weigh the same, and nothing need be worked out for each.
+        // Cells that fill the texel weigh the same, so no weight is worked out for each.
         let even = self.nests(level).then(|| 1.0 / (columns.len() * rows.len()) as f32);
         for j in rows {
             let start = (j * self.cells.width + columns.start) * n;
@@ -176,7 +176,7 @@ struct Part {
     range: Range<usize>,
     /// Weight times the square of the widest extent.
     spread: f32,
-    /// Where that is, and its middle.
+    /// Axis of the widest extent, and the middle of that extent.
     axis: usize,
     middle: f32,
 }

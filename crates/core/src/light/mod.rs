@@ -10,16 +10,16 @@ use glam::DVec3;
 /// A light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Light {
-    /// One so far away that all see it in the same direction.
+    /// Light so far away that its direction is the same everywhere.
     Directional {
         /// Unit vector to the light.
         towards: DVec3,
         /// Irradiance on a plane that faces it, linear RGB.
         irradiance: DVec3,
     },
-    /// One at a place.
+    /// Light at a place.
     Point {
-        /// Where it is.
+        /// Place of the light.
         at: DVec3,
         /// Radiant intensity, linear RGB: irradiance at distance 1.
         intensity: DVec3,

@@ -1,16 +1,16 @@
-//! What a lobe reflects of light that is the same from everywhere: the half of shading that knows of no
-//! environment.
+//! Reflection of light that is the same from everywhere, by a lobe: the half of shading that does not depend
+//! on the environment.
 //!
-//! Karis 2013 parts the integral over an environment in two: the mean radiance that a lobe sees, and what it
-//! reflects of a white sky. Here the second is that of our own shading under lights, for any lobe and model:
-//! the integral over all directions of the light of what `reflect` (`ndf/reflect.rs`) gives for one lobe of
-//! normals, factors at the normals that answer included. A table over the cosine between the lobe's mean and
-//! the eye, and over the spread of its normals.
+//! Karis 2013 parts the integral over an environment in two: the mean radiance that a lobe sees, and the
+//! share of a white sky that it reflects. Here the second comes from our own shading under lights, for any
+//! lobe and model: it is the integral, over all directions of the light, of `reflect` (`ndf/reflect.rs`) for
+//! one lobe of normals, factors at the normals that answer included. It is kept in a table over the cosine
+//! between the lobe's mean and the eye, and over the spread of its normals.
 //!
-//! Where the light comes from is of interest too: of a wide lobe seen flatly half is below the horizon of the
-//! normals that answer, so the rest comes from above the mirror direction, and from a narrower range. The
-//! table has both, from the mean of the light's directions, so that a blurred cube is asked for what has the
-//! same mean: else a bright window behind a sphere shines through its rim.
+//! The directions that the light comes from matter too. Half of a wide lobe seen at a grazing angle is below
+//! the horizon of the normals that answer, so the rest comes from above the mirror direction, and from a
+//! narrower range. The table has both, from the mean of the light's directions, so that the look-up in a
+//! blurred cube has the same mean: else a bright window behind a sphere shines through its rim.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -28,21 +28,21 @@ pub const ENTRIES: usize = 16;
 /// Least cosine that the table is made for.
 const LEAST_COSINE: f64 = 1e-3;
 
-/// What is reflected of a white sky.
+/// Light of a white sky that a lobe reflects.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reflected {
-    /// Times the specular colour, and what the lobe's own colour makes of it.
+    /// Part that the specular colour multiplies, with the lobe's own colour in it.
     pub scale: DVec3,
-    /// Whatever the specular colour is.
+    /// Part that does not depend on the specular colour.
     pub bias: f64,
-    /// The lobe alone, without factor or colour: what [`Self`]'s light is a mean by.
+    /// The lobe alone, without factor or colour: the weight by which [`Self`]'s light is averaged.
     pub lobe: f64,
     /// The mean of Fresnel's rise over the diffuse part.
     pub rise: f64,
     /// Sine of the angle between the lobe's mean and the mean direction of the light, over that of the mirror
     /// direction.
     pub tilt: f64,
-    /// Perceptual roughness of the blur that has light from as wide a range, over that of the lobe itself.
+    /// Perceptual roughness of the blur that takes light from as wide a range, over that of the lobe itself.
     pub blur: f64,
 }
 
@@ -71,11 +71,11 @@ impl Reflected {
 /// The table of a material's lobe and model.
 #[derive(Clone, Debug)]
 pub struct SplitSum {
-    /// One spread after the other, each for every cosine.
+    /// Entries for one spread after the other, each for every cosine.
     entries: Vec<Reflected>,
     /// Zonal coefficients of the lobe, to the order that half-vectors have.
     pub zonal: [f64; HALF_VECTOR_ORDER + 1],
-    /// The cubes that its highlights look up.
+    /// Microfacets that blur the cubes for its highlights.
     pub microfacets: Microfacets,
     /// Facets of the lobe, per unit of map: the integral of its profile over slopes.
     pub facets: f64,
@@ -99,7 +99,7 @@ impl SplitSum {
         }
     }
 
-    /// What normals of this spread reflect to an eye at this cosine to their mean.
+    /// Light that normals of this spread reflect to an eye at this cosine to their mean.
     #[must_use]
     pub fn lookup(&self, cosine: f64, spread: SlopeVariance) -> Reflected {
         let last = (ENTRIES - 1) as f64;
@@ -128,7 +128,7 @@ impl SplitSum {
     }
 }
 
-/// Integral of a lobe's profile over slopes, in its own deviations, to sixty-four of them.
+/// Integral of a lobe's profile over slopes, in its own deviations, out to sixty-four of them.
 fn facets(lobe: &dyn Lobe) -> f64 {
     let (mut sum, mut from, mut to) = (0.0, 0.0, 1.0);
     while to <= 64.0 {
@@ -166,7 +166,7 @@ fn reflected(brdf: &Brdf, cosine: f64, spread: SlopeVariance) -> Reflected {
         let density = Microfacets::Ggx.d_of_tangent(alpha_squared, tan_squared) * z;
         let solid_angle = slope / (density * (RINGS * SPOKES) as f64);
         let r = (1.0 - z * z).max(0.0).sqrt();
-        // The same on both sides of the plane of incidence.
+        // Both sides of the plane of incidence are alike.
         for spoke in 0..SPOKES {
             let (y, x) = (TAU * (spoke as f64 + 0.5) / SPOKES as f64).sin_cos();
             let wh = DVec3::new(r * x, r * y, z);
@@ -175,7 +175,7 @@ fn reflected(brdf: &Brdf, cosine: f64, spread: SlopeVariance) -> Reflected {
                 continue;
             }
             let directions = Directions { wi: 2.0 * u * wh - wo, wo, wh, u };
-            // Directions of the light are 4 u as many.
+            // The light's directions fill 4 u times the solid angle.
             let lobe = brdf.lobe.evaluate_widened(spread, z) * 4.0 * u * solid_angle;
             let n = (DVec3::Z * base.get() + wh * spread.get()).try_normalize().unwrap_or(DVec3::Z);
             let answered = lobe * brdf.factor(n, &directions, SlopeVariance::ZERO);
@@ -215,7 +215,7 @@ fn rise(wo: DVec3) -> f64 {
 }
 
 impl Reflected {
-    /// What is left for the diffuse part of a material of this specular colour.
+    /// Share that is left for the diffuse part of a material of this specular colour.
     #[must_use]
     pub fn diffuse_share(&self, shading: ShadingModel, specular: DVec3) -> DVec3 {
         match shading {
@@ -237,9 +237,9 @@ mod tests {
 
     #[test]
     fn a_smooth_mirror_reflects_all_and_a_rough_one_less() {
-        // Without Fresnel (specular 1), microfacets that hide each other and nothing else send back what they
-        // see: 1, for masking alone, but for light from below, which the normal's own hemisphere ends: none
-        // at alpha 0.05 seen straight on.
+        // Without Fresnel (specular 1), microfacets under masking alone send back all that they see, 1,
+        // except light from below, which the normal's own hemisphere cuts off: none at alpha 0.05 seen
+        // straight on.
         let masked = table("ggx:0.05", ShadingModel::Masked);
         let straight = masked.lookup(1.0, SlopeVariance::ZERO);
         assert!((straight.scale.x + straight.bias - 1.0).abs() < 0.01, "{straight:?}");
@@ -252,7 +252,7 @@ mod tests {
 
     #[test]
     fn tables_are_the_integral() {
-        // Against plain quadrature over the light's directions of what shading gives for them.
+        // Against plain quadrature of shading over the light's directions.
         for (lobe, shading) in [
             ("blinn-phong:20", ShadingModel::Han),
             ("beckmann:0.4", ShadingModel::Smith),
@@ -287,8 +287,8 @@ mod tests {
             assert!((got.lobe / lobe_sum - 1.0).abs() < 0.005, "{lobe}: {} {lobe_sum}", got.lobe);
             assert!((got.scale.x / scale - 1.0).abs() < 0.01, "{lobe}: {} {scale}", got.scale.x);
             assert!((got.bias - bias).abs() < 0.01 * scale, "{lobe}: {} {bias}", got.bias);
-            // Where the light comes from, of the same rings: a cosine that is 1 % off at 60 degrees is half a
-            // degree, and roughness is a root.
+            // Direction that the light comes from, by the same rings: a cosine that is 1 % off at 60 degrees
+            // is half a degree, and roughness is a root.
             let mean = towards / (scale + bias);
             let angle = got.towards(DVec3::Z, wo).angle_between(mean).to_degrees();
             assert!(angle < 0.5, "{lobe}: {angle} degrees");

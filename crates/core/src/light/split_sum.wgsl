@@ -1,13 +1,13 @@
-// What a lobe reflects of light that is the same from everywhere. Twin of split_sum.rs.
+// Reflection of light that is the same from everywhere, by a lobe. Twin of split_sum.rs.
 
 // Entries of the table on each axis. The row below them has the lobe's zonal coefficients, and in its first
-// texel what facets it has.
+// texel the lobe's facets.
 const SPLIT_SUM_ENTRIES: u32 = 16u;
 
 struct Reflected {
-    // Times the specular colour.
+    // Part that the specular colour multiplies.
     scale: vec3<f32>,
-    // Whatever the specular colour is.
+    // Part that does not depend on the specular colour.
     bias: f32,
     // The lobe alone.
     lobe: f32,
@@ -16,11 +16,11 @@ struct Reflected {
     // Sine of the angle between the lobe's mean and the mean direction of the light, over that of the mirror
     // direction.
     tilt: f32,
-    // Perceptual roughness of the blur that has light from as wide a range, over that of the lobe itself.
+    // Perceptual roughness of the blur that takes light from as wide a range, over that of the lobe itself.
     blur: f32,
 }
 
-// What normals of this spread reflect to an eye at this cosine to their mean.
+// Light that normals of this spread reflect to an eye at this cosine to their mean.
 fn split_sum(cosine: f32, spread: f32) -> Reflected {
     let last = f32(SPLIT_SUM_ENTRIES - 1u);
     let x = clamp(cosine, 0.0, 1.0) * last;
@@ -42,7 +42,7 @@ fn reflected_towards(reflected: Reflected, mu: vec3<f32>, wo: vec3<f32>) -> vec3
     return across + mu * sqrt(max(1.0 - dot(across, across), 0.0));
 }
 
-// What is left for the diffuse part of a material of this specular colour.
+// Share that is left for the diffuse part of a material of this specular colour.
 fn reflected_diffuse_share(shading: u32, rise: f32, specular: vec3<f32>) -> vec3<f32> {
     return select(1.0 - specular - (1.0 - specular) * rise, vec3<f32>(1.0), shading == HAN);
 }

@@ -1,10 +1,10 @@
 //! Error between texels, where a filtered picture lives: at the middle of edges and at corners.
 //!
-//! The truth there is the mean of what the two or four texels around truly reflect, which is what a linear
-//! filter of reflectance would show. Two ways to approach it are measured: decoding the *filtered* channels,
+//! The truth there is the mean of the true reflectance of the two or four texels around, as a linear filter
+//! of reflectance would show. Two ways to approach it are measured: decoding the *filtered* channels,
 //! and the *reference path*, which shades every neighbour and blends the results (Han et al. 2007, section
-//! 6.3, for lobes that are not aligned). What the first loses against the second is misalignment, or for one
-//! lobe the width that its variance cannot hold.
+//! 6.3, for lobes that are not aligned). The first loses against the second by misalignment, or, for one
+//! lobe, by the width that its variance cannot hold.
 
 use glam::DVec2;
 use rand::{SeedableRng, seq::SliceRandom};
@@ -42,11 +42,11 @@ pub struct TrueCorners {
 pub struct FilteringError {
     /// The level.
     pub level: usize,
-    /// At the texels themselves, those around the same corners.
+    /// Error at the texels themselves, those around the same corners.
     pub texels: f64,
-    /// Between them, by the filtered channels.
+    /// Error between them, by the filtered channels.
     pub filtered: f64,
-    /// Between them, by the reference path.
+    /// Error between them, by the reference path.
     pub reference: f64,
 }
 
@@ -90,8 +90,8 @@ fn corners_of(size: Size, wraps: Wraps, level: usize) -> Vec<Corner> {
     drawn.iter().map(corner).collect()
 }
 
-/// Which of a corner's texels meet at each place measured, and where that is, in texels from the first one's
-/// corner.
+/// Places measured at a corner: which of its texels meet there, and where that is, in texels from the first
+/// one's corner.
 const PLACES: [(&[usize], DVec2); 3] =
     [(&[0, 1], DVec2::new(1.0, 0.5)), (&[0, 2], DVec2::new(0.5, 1.0)), (&[0, 1, 2, 3], DVec2::new(1.0, 1.0))];
 
@@ -110,8 +110,8 @@ pub fn evaluate_neighbours(
     }
 }
 
-/// The errors of a baked map between the texels of a level. What cannot be filtered takes the reference path
-/// for both.
+/// The errors of a baked map between the texels of a level. A method that cannot be filtered takes the
+/// reference path for both.
 #[must_use]
 pub fn filtering_error(
     pyramid: &Pyramid,

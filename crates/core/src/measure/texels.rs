@@ -21,7 +21,7 @@ use crate::surface::{Surface, SurfaceRow};
 /// Directions with `w.xy` beyond this radius are left out: at the horizon slopes blow up.
 pub const DISK_RADIUS: f64 = 0.97;
 
-/// Up to this many texels of a level, all are measured; of more, [`SAMPLED_TEXELS`] drawn evenly.
+/// Most texels of a level that are all measured; of more, [`SAMPLED_TEXELS`] are drawn evenly.
 pub const MAX_TEXELS: usize = 512;
 
 /// Texels drawn from a level that has more than [`MAX_TEXELS`].
@@ -132,7 +132,7 @@ fn reach(lobe: &dyn Lobe) -> f64 {
     far
 }
 
-/// One level's texels and their true lobes.
+/// Texels of one level and their true lobes.
 pub struct TrueLevel {
     /// The level.
     pub level: usize,

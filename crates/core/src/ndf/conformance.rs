@@ -1,4 +1,4 @@
-//! What every row of the table must satisfy. None of it is written for one method.
+//! Conformance suite: what every row of the table must satisfy. No test is written for one method.
 
 use glam::{DVec3, Vec2, Vec3};
 
@@ -19,7 +19,7 @@ fn method(spelling: &str) -> AnyMethod {
 
 fn methods() -> Vec<AnyMethod> {
     let table = TABLE.iter().flat_map(|row| row.samples).map(|s| method(s));
-    // One whose lobes have six statistics, in two layers each.
+    // A method whose lobes have six statistics, in two layers each.
     table.chain([AnyMethod::from(Elliptic::new(2))]).collect()
 }
 
@@ -32,7 +32,8 @@ fn bake(method: &dyn Method, surface: &dyn Surface, precision: Precision) -> cra
     Bake::new(surface, method).precision(precision).to_pyramid().unwrap().0
 }
 
-/// What must be the same however normals are shared out among lobes: the channels, summed over fitted lobes.
+/// Totals that do not depend on how normals are shared out among lobes: the channels, summed over fitted
+/// lobes.
 fn totals(method: &dyn Method, channels: &[f32]) -> Vec<f32> {
     let Some(layout) = method.lobe_layout().filter(|_| method.fit().is_some()) else {
         return channels.to_vec();
@@ -210,8 +211,8 @@ fn levels_are_area_weighted_means_of_the_finest() {
                         }
                     }
                     // Sums of up to 273 single floats. Lobes too light to store give their 1/8192 to the
-                    // others. The prior and refinement move means on purpose; how far they may is what a
-                    // picture would hardly show.
+                    // others. The prior and refinement move means on purpose; the bound is what a picture
+                    // would hardly show.
                     let tolerance = match method.fit().map(|f| f.alignment) {
                         None => 1e-5,
                         Some(Alignment::Refined | Alignment::Prior) => 0.1,
@@ -322,7 +323,7 @@ fn half_floats_and_sharp_lobes_stay_in_bounds() {
 
 #[test]
 fn any_finite_channels_decode_to_something_finite() {
-    // What a damaged but well-formed file can hold.
+    // Values that a damaged but well-formed file can hold.
     for method in methods() {
         let lobe = "blinn-phong:50".parse::<AnyLobe>().unwrap();
         let directions = [DVec3::Z, DVec3::new(0.6, 0.0, 0.8)];

@@ -1,8 +1,8 @@
 //! Method of lobes with six statistics, which only the tests have: whatever is fitted, stored, filtered and
-//! decoded asks a lobe how many statistics it has, and none of it takes them for four.
+//! decoded asks a lobe how many statistics it has, and never assumes four.
 //!
 //! A lobe is a Gaussian of `n.xy` with a covariance of its own, `alpha (1, x, y, x², y², xy)` in two layers.
-//! It is shaded as the isotropic one of the same trace.
+//! For shading it counts as the isotropic lobe of the same trace.
 
 use std::fmt::{self, Display};
 
@@ -44,7 +44,7 @@ struct EllipticLobe {
     covariance: [f64; 3],
 }
 
-/// What a texel decodes to.
+/// Mixture that a texel decodes to.
 pub(super) struct EllipticMixture {
     lobes: Vec<EllipticLobe>,
 }
@@ -194,7 +194,7 @@ fn six_statistics_are_fitted_stored_filtered_and_decoded() {
             assert!(carried.iter().zip(colour).all(|(c, k)| (c - k).abs() < 1e-5), "{carried:?}");
         }
     }
-    // Filtered: what lies between two texels decodes to what both hold.
+    // Filtered: a point between two texels decodes to what both hold.
     let mut between = vec![0.0; pyramid.channels()];
     pyramid.bilinear(2, glam::DVec2::new(0.25, 0.5), 1.0, &mut between);
     let decoded = elliptic.decode(&elliptic.unpack(&between[..4 * method.layers()]));

@@ -6,7 +6,7 @@
 use super::NdmKernel;
 use crate::fit::LobeKind;
 
-/// What the channels of a stored map are.
+/// Encoding: the meaning of a stored map's channels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Encoding {
@@ -83,8 +83,11 @@ impl LobeLayout {
     /// layer.
     #[must_use]
     pub fn attribute(self, channels: &[f32], attribute: usize, lobe: usize) -> Option<[f32; 4]> {
-        // It is stored times the lobe's weight, which comes first in the lobe's own layer.
-        let weight = channels[4 * self.layer(lobe)].max(f32::MIN_POSITIVE);
+        if lobe >= self.count {
+            return None;
+        }
+        // An attribute is stored times the lobe's weight, which comes first in the lobe's own layer.
+        let weight = channels.get(4 * self.layer(lobe))?.max(f32::MIN_POSITIVE);
         let stored = channels.get(4 * self.attribute_layer(attribute, lobe)..)?.first_chunk::<4>()?;
         Some(stored.map(|value| value / weight))
     }

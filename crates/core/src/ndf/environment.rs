@@ -1,8 +1,8 @@
-//! Shading a filtered texel under an environment: what its normals together send to the eye of light from
-//! everywhere.
+//! Shading a filtered texel under an environment: the light from everywhere that its normals together send to
+//! the eye.
 //!
 //! A sum of isotropic lobes is lit lobe by lobe. Diffuse: Han et al. 2007, equation 25. Specular: the mean
-//! radiance that the lobe sees, by either [`Technique`], times what it reflects of a white sky
+//! radiance that the lobe sees, by either [`Technique`], times the share of a white sky that it reflects
 //! (`light/split_sum.rs`). A method that is no such sum is lit as one lobe, of its mean and spread. But a
 //! Gaussian of slopes is lit over a grid of them, as LEADR has it (Dupuy et al. 2013, sections 3.5 and 3.6):
 //! each slope mirrors the eye into the environment, looked up as wide as the solid angle that it stands for;
@@ -21,18 +21,18 @@ use crate::light::SplitSum;
 use crate::light::environment::{FilteredEnvironment, HALF_VECTOR_ORDER, Technique};
 use crate::units::SlopeVariance;
 
-/// What surrounds a place.
+/// Environment, as a point of the surface sees it.
 #[derive(Clone, Copy)]
 pub struct LocalEnvironment<'a> {
     /// The light.
     pub light: &'a FilteredEnvironment,
-    /// How highlights look it up.
+    /// Technique by which highlights look it up.
     pub technique: Technique,
-    /// From the tangent frame to the environment's.
+    /// Rotation from the tangent frame to the environment's.
     pub to_environment: DMat3,
     /// Unit vector to the eye, in the tangent frame.
     pub wo: DVec3,
-    /// What the material reflects of a white sky.
+    /// Light of a white sky that the material reflects.
     pub split_sum: &'a SplitSum,
 }
 
@@ -147,8 +147,8 @@ struct Mirrors<'a> {
 }
 
 impl Mirrors<'_> {
-    /// What a facet shows: the environment in the mirror direction, as wide as the slopes that it stands for,
-    /// and Fresnel's term.
+    /// Light that a facet shows: the environment in the mirror direction, as wide as the slopes that it
+    /// stands for, and Fresnel's term.
     fn shown(&self, sample: &SlopeSample) -> Option<(Directions, DVec3)> {
         let n = sample.slope_normal.normalize();
         let u = n.dot(self.local.wo);
@@ -164,7 +164,8 @@ impl Mirrors<'_> {
         Some((directions, radiance * self.brdf.fresnel(self.params.specular, u)))
     }
 
-    /// Of a displaced surface: LEADR's sum, by what the eye sees of each facet, over what it sees in all.
+    /// Light of a displaced surface: LEADR's sum, in which each facet weighs by what the eye sees of it, over
+    /// what it sees in all.
     fn of_displaced(&self) -> DVec3 {
         let wo = self.local.wo;
         let lobe = &*self.brdf.lobe;
@@ -183,8 +184,8 @@ impl Mirrors<'_> {
             weight,
             SlopeSample { slope_normal: n, weight, square: 0.0, step: SlopeGrid::step(self.grid.len()) },
         ));
-        // Facets that others hide from the light: `seen` is a (1 + Lambda(wo)), of which a Lambda(wi) more is
-        // in shadow.
+        // Facets that others hide from the light: `seen` is a (1 + Lambda(wo)), and a Lambda(wi) more is in
+        // shadow.
         let hidden = |wi: DVec3| {
             if self.brdf.shading != ShadingModel::Shadowed {
                 return 0.0;
@@ -200,8 +201,8 @@ impl Mirrors<'_> {
         facets.iter().map(of).sum()
     }
 
-    /// Of a normal map: the integral over half-vectors of what `reflect` gives for a light, `4 u` for the
-    /// light's directions. `narrow` is the Gaussian without the lobe's own width.
+    /// Light of a normal map: the integral over half-vectors of what `reflect` gives for a light, `4 u` for
+    /// the light's directions. `narrow` is the Gaussian without the lobe's own width.
     fn of_map(&self, narrow: SlopeGaussian) -> DVec3 {
         let lobe = &*self.brdf.lobe;
         let base = self.brdf.width(self.params.roughness);
@@ -223,7 +224,7 @@ impl Mirrors<'_> {
         sum
     }
 
-    /// What all slopes of the grid weigh.
+    /// Total weight of the grid's slopes.
     fn total(&self, lobe: &dyn Lobe) -> f64 {
         let mut total = 0.0;
         self.g.samples(self.grid, |sample| total += profile(lobe, &sample));
@@ -231,8 +232,7 @@ impl Mirrors<'_> {
     }
 }
 
-/// Weight of a slope, for facets that are distributed as those of a lobe are: Gaussian ones weigh as the grid
-/// says.
+/// Weight of a slope, for facets distributed as a lobe's: Gaussian ones weigh as the grid says.
 fn profile(lobe: &dyn Lobe, sample: &SlopeSample) -> f64 {
     match lobe.microfacets() {
         Microfacets::Beckmann => sample.weight,
@@ -300,8 +300,8 @@ mod tests {
                 let converged = by("slopes:128");
                 for (method, bound) in [("slopes", 0.01), ("slopes:9", 0.002)] {
                     let off = (by(method) - converged).length() / converged.length();
-                    // Seen flatly, at roughness 0.5 and a fifth, five slopes across what the eye sees of them
-                    // are few.
+                    // At a grazing angle, at roughness 0.5 and a fifth, five slopes are few across those that
+                    // the eye sees.
                     let bound = if cosine < 0.3 { 3.0 * bound } else { bound };
                     assert!(off < bound, "{method} {deviations:?} {cosine}: {off}");
                 }
@@ -311,7 +311,7 @@ mod tests {
 
     #[test]
     fn mirrors_that_hide_each_other_reflect_a_white_sky_whole() {
-        // Whatever the slopes: what the eye sees of facets that mirror all, is white.
+        // Whatever the slopes, facets that mirror everything look white.
         for lobe in ["beckmann:0.1", "ggx:0.2"] {
             let brdf = Brdf { lobe: lobe.parse::<AnyLobe>().unwrap(), shading: ShadingModel::Masked };
             for deviations in DEVIATIONS {
@@ -326,7 +326,7 @@ mod tests {
                 }
             }
         }
-        // And with shadows less of it, more so where it is rough.
+        // Shadows take some of it, and more where the surface is rough.
         let brdf = Brdf { lobe: "beckmann:0.1".parse::<AnyLobe>().unwrap(), shading: ShadingModel::Shadowed };
         let shadowed = |deviation| light("slopes:32", &brdf, (deviation, deviation), ("white", 0.5)).x;
         assert!(shadowed(0.1) < 1.0 && shadowed(0.5) < shadowed(0.25), "{} {}", shadowed(0.1), shadowed(0.5));
@@ -349,8 +349,8 @@ mod tests {
             }
             let [five, nine, thirty_two] = off.map(|sum: f64| (sum / all).sqrt());
             assert!(thirty_two < nine && nine < five, "{deviation}: {five} {nine} {thirty_two}");
-            // Of 32 × 32 each is looked up a level wider than its solid angle, as the paper has it: lamps'
-            // edges are softer by so much.
+            // With 32 × 32 slopes, each is looked up a level wider than its solid angle, as the paper has it:
+            // lamps' edges are softer by that much.
             assert!(thirty_two < 0.1, "{deviation}: {thirty_two}");
         }
     }

@@ -1,10 +1,10 @@
-// Shading a filtered texel under an environment, what methods share. Twin of environment.rs.
+// Shading a filtered texel under an environment: the parts that methods share. Twin of environment.rs.
 
-// What surrounds a place.
+// Environment, as a point of the surface sees it.
 struct LocalEnvironment {
-    // From the tangent frame to the environment's.
+    // Rotation from the tangent frame to the environment's.
     rotation: mat3x3<f32>,
-    // To the eye, in the tangent frame.
+    // Unit vector to the eye, in the tangent frame.
     wo: vec3<f32>,
     // On a displaced surface, how slopes of the map lie on it.
     displaced: bool,

@@ -14,7 +14,7 @@ pub enum FormKind {
     Lobes,
     /// Gaussians of slopes, which know displacement and environments as LEADR has them.
     Slopes,
-    /// One distribution, shaded by its effective lobe.
+    /// A single distribution, shaded by its effective lobe.
     Whole,
 }
 
@@ -32,7 +32,7 @@ pub enum Form<'a> {
     Lobes(Vec<NormalLobe>, Cosine),
     /// A Gaussian of slopes, and the slopes over which diffuse facets and environments are averaged.
     Slopes(SlopeGaussian, &'a SlopeGrid),
-    /// One distribution, of this mean normal; the further the normals stray, the shorter.
+    /// A single distribution, with this mean normal: the shorter, the further the normals stray.
     Whole(DVec3),
 }
 

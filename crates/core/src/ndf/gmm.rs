@@ -26,7 +26,7 @@ use crate::units::SlopeVariance;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gmm {
     fit: Fit,
-    /// Variances interpolated as printed.
+    /// True for variances interpolated as printed.
     printed: bool,
 }
 
@@ -57,8 +57,8 @@ impl From<GaussianMixture> for Decoded {
     }
 }
 
-/// `w · n` of a normal as far from `w` as the two are in the plane: what the BRDF's own profile is a function
-/// of.
+/// Cosine `w · n` of a normal as far from `w` as the two are in the plane: the argument of the BRDF's own
+/// profile.
 ///
 /// The plane is that of the upper hemisphere; below it nothing is reflected.
 fn planar_cosine(w: DVec3, mu: DVec3) -> f64 {
@@ -80,14 +80,14 @@ impl Gmm {
         Ok(Self { fit, printed: false })
     }
 
-    /// The same, lobes of neighbours made to correspond in another way.
+    /// Returns it with another way of making lobes of neighbours correspond.
     #[must_use]
     pub fn alignment(mut self, alignment: Alignment) -> Self {
         self.fit.alignment = alignment;
         self
     }
 
-    /// The same, variances interpolated as the paper prints it.
+    /// Returns it with variances interpolated as the paper prints it.
     #[must_use]
     pub fn printed(self) -> Self {
         Self { printed: true, ..self }

@@ -19,7 +19,8 @@ fn decode_lobe(channels: ptr<function, Channels>, layer: u32) -> NormalLobe {
     return NormalLobe(vec3<f32>(held, 0.0), alpha, select(second / 2.0, second, PRINTED));
 }
 
-// w · n of a normal as far from `w` as the two are in the plane; below the horizon nothing is reflected.
+// Cosine w · n of a normal as far from `w` as the two are in the plane; below the horizon nothing is
+// reflected.
 fn cosine(w: vec3<f32>, mu: vec3<f32>) -> f32 {
     if w.z <= 0.0 {
         return -1.0;

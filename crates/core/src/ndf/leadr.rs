@@ -1,4 +1,4 @@
-//! LEADR: what a displaced surface sends to the eye, when its slopes are a Gaussian. Dupuy et al. 2013.
+//! LEADR: light that a displaced surface sends to the eye, when its slopes are a Gaussian. Dupuy et al. 2013.
 //!
 //! Where the map displaces a surface, a facet weighs by the area that the eye sees of it, not by that of the
 //! map. Per unit of map area, of facets with slope density P22 (`slopes.rs`), the eye sees in all `A(wo) = ∫
@@ -24,15 +24,15 @@ use crate::brdf::{Brdf, Directions, Lobe, ShadingModel};
 /// Weight of the artificial normal that keeps silhouettes defined (section 3.7).
 const ARTIFICIAL_WEIGHT: f64 = 1e-5;
 
-/// How far beyond the edge-on the artificial normal is turned towards the eye.
+/// Turn of the artificial normal towards the eye: 1 would leave it edge-on.
 const ARTIFICIAL_TURN: f64 = 1.01;
 
 /// Least that the eye sees of the artificial normal, so that there is always something to divide by.
 const LEAST_VISIBLE: f64 = 1e-6;
 
 impl SlopeGaussian {
-    /// This distribution after a linear map of slopes: how slopes of a map lie on a surface that it is
-    /// stretched over.
+    /// This distribution after a linear map of slopes, which tells how slopes of a map lie on a surface that
+    /// it is stretched over.
     #[must_use]
     pub fn stretched(self, by: DMat2) -> Self {
         let [xx, yy, xy] = self.covariance;
@@ -77,7 +77,7 @@ impl SlopeGaussian {
     }
 
     /// D(n): area of facets per solid angle of their normals, per unit of map area, for slopes distributed as
-    /// those of `lobe` are, and the lobe's own width in the covariance already.
+    /// those of `lobe`. The covariance holds the lobe's own width already.
     #[must_use]
     pub fn facets(&self, lobe: &dyn Lobe, n: DVec3) -> f64 {
         if n.z <= 0.0 {
@@ -87,14 +87,14 @@ impl SlopeGaussian {
         lobe.slope_profile(square) / root_of_determinant(self.covariance) / n.z.powi(4)
     }
 
-    /// A normal that the eye sees where it sees no other (section 3.7), and how much of it.
+    /// Normal that the eye sees where it sees no other (section 3.7), and how much of it the eye sees.
     fn artificial_normal(&self, wo: DVec3) -> (DVec3, f64) {
         let mean = (-self.mean).extend(1.0).normalize();
         let n = (mean - wo * (ARTIFICIAL_TURN * mean.dot(wo))).try_normalize().unwrap_or(wo);
         (n, n.dot(wo).max(LEAST_VISIBLE))
     }
 
-    /// The same with its weight among slopes that weigh one together.
+    /// Artificial normal with its weight, beside slopes that weigh one together.
     pub(super) fn artificial(&self, wo: DVec3) -> (DVec3, f64) {
         let (n, seen) = self.artificial_normal(wo);
         (n, ARTIFICIAL_WEIGHT * seen)
@@ -163,12 +163,12 @@ impl SlopeGrid {
         Self { n, drawn: false, points: (0..n).map(|i| (at(i), weight(at(i)) / total)).collect() }
     }
 
-    /// As many slopes drawn at random, always the same.
+    /// Set of `n` × `n` slopes drawn at random, always the same ones.
     pub(super) fn drawn(n: usize) -> Self {
         Self { drawn: true, ..Self::new(n) }
     }
 
-    /// What is between two points.
+    /// Step between two points, in deviations.
     pub(super) fn step(n: usize) -> f64 {
         if n == 5 { 0.9 } else { 6.0 / (n - 1) as f64 }
     }
@@ -199,14 +199,14 @@ impl SlopeGrid {
         let radius = (-2.0 * u.ln()).sqrt();
         let (sin, cos) = (std::f64::consts::TAU * v).sin_cos();
         let share = 1.0 / (self.n * self.n) as f64;
-        // One over the density there, shared out.
+        // Inverse of the density there, shared out.
         let step = (std::f64::consts::TAU / u * share).sqrt();
         (DVec2::new(radius * cos, radius * sin), share, step)
     }
 
-    /// What is added to the level, by how many slopes there are (section 3.5): wider than their solid angle
-    /// where they are few, lest there be bands. Between the paper's three, evenly in the logarithm; drawn
-    /// ones as they are.
+    /// Offset of the level for this number of slopes (section 3.5): few slopes are looked up wider than their
+    /// solid angle, lest there be bands. Between the paper's three numbers it is interpolated, evenly in the
+    /// logarithm; drawn slopes take the last.
     pub(super) fn level_offset(&self) -> f64 {
         const OFFSETS: [(f64, f64); 3] = [(5.0, 0.5), (32.0, -0.5), (128.0, -1.48)];
         if self.drawn {
@@ -218,22 +218,21 @@ impl SlopeGrid {
     }
 }
 
-/// A number that is as good as random for each other number (the permuted congruential generator of O'Neill
-/// 2014, as a hash).
+/// Hash of a number, as good as random (the permuted congruential generator of O'Neill 2014).
 fn hash(v: u32) -> u32 {
     let state = v.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
     let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
     (word >> 22) ^ word
 }
 
-/// Light from specular facets along a way, per unit of irradiance, Fresnel's term apart. `spread` holds the
+/// Light from specular facets along a path, per unit of irradiance, Fresnel's term apart. `spread` holds the
 /// lobe's own width already.
 fn specular(brdf: &Brdf, spread: &SlopeGaussian, texel: &FilteredTexel<'_>, directions: &Directions) -> f64 {
     let lobe = &*brdf.lobe;
     let roughness = (texel.params)(None).roughness;
     let lit = spread.facets(lobe, directions.wh) / 4.0;
     if texel.at_means {
-        // As printed: of what it divides by nothing is clamped but in the rational form itself.
+        // As printed: only the rational form itself clamps what the light is divided by.
         let shadow =
             if brdf.shading == ShadingModel::Shadowed { spread.lambda_rational(directions.wi) } else { 0.0 };
         return lit
@@ -256,7 +255,7 @@ fn shadow(brdf: &Brdf, spread: &SlopeGaussian, directions: &Directions) -> Optio
     lambda.is_finite().then(|| spread.projected_area(directions.wo).max(0.0) * lambda)
 }
 
-/// Light from diffuse facets along a way, per unit of irradiance, times pi over their albedo.
+/// Light from diffuse facets along a path, per unit of irradiance, times pi over their albedo.
 fn diffuse(brdf: &Brdf, g: &SlopeGaussian, grid: &SlopeGrid, directions: &Directions) -> f64 {
     let Some(shadow) = shadow(brdf, g, directions) else { return 0.0 };
     let (mut lit, mut seen) = (0.0, 0.0);

@@ -1,4 +1,4 @@
-// LEADR: what a displaced surface sends to the eye, when its slopes are a Gaussian. Twin of leadr.rs.
+// LEADR: light that a displaced surface sends to the eye, when its slopes are a Gaussian. Twin of leadr.rs.
 //
 // Diffuse facets are averaged over GRID × GRID slopes: GRID_STEP deviations apart, or (GRID_DRAWN) drawn at
 // random.
@@ -6,7 +6,7 @@
 // Weight of the artificial normal that keeps silhouettes defined.
 const ARTIFICIAL_WEIGHT: f32 = 1e-5;
 
-// How far beyond the edge-on the artificial normal is turned towards the eye.
+// Turn of the artificial normal towards the eye: 1 would leave it edge-on.
 const ARTIFICIAL_TURN: f32 = 1.01;
 
 // Least that the eye sees of the artificial normal.
@@ -35,13 +35,13 @@ fn lambda(g: Decoded, w: vec3<f32>, area: f32) -> f32 {
     return max(lobe_visible_area(area, projected_deviation(g, w)) / area - 1.0, 0.0);
 }
 
-// The same in Walter et al.'s rational form, with the paper's clamps.
+// Smith's Lambda in Walter et al.'s rational form, with the paper's clamps.
 fn lambda_rational(g: Decoded, w: vec3<f32>) -> f32 {
     let nu = clamp(projected_area(g, w) / (1.41421356 * projected_deviation(g, w)), 0.001, 1.599);
     return (1.0 - 1.259 * nu + 0.396 * nu * nu) / (3.535 * nu + 2.181 * nu * nu);
 }
 
-// D(n): area of facets per solid angle of their normals, the lobe's own width in the covariance already.
+// D(n): area of facets per solid angle of their normals, with the lobe's own width in the covariance already.
 fn facets(g: Decoded, base: f32, n: vec3<f32>) -> f32 {
     if n.z <= 0.0 {
         return 0.0;
@@ -51,7 +51,7 @@ fn facets(g: Decoded, base: f32, n: vec3<f32>) -> f32 {
     return lobe_slope_profile(base, square) * inverseSqrt(determinant_of(g.covariance)) / (z2 * z2);
 }
 
-// A normal that the eye sees where it sees no other, and how much of it.
+// Normal that the eye sees where it sees no other, and how much of it the eye sees.
 fn artificial_normal(g: Decoded, wo: vec3<f32>) -> vec4<f32> {
     let mean = normalize(vec3<f32>(-g.mean, 1.0));
     let v = mean - wo * (ARTIFICIAL_TURN * dot(mean, wo));
@@ -60,8 +60,7 @@ fn artificial_normal(g: Decoded, wo: vec3<f32>) -> vec4<f32> {
     return vec4<f32>(n, max(dot(n, wo), LEAST_VISIBLE));
 }
 
-// A number that is as good as random for each other number (the permuted congruential generator of O'Neill
-// 2014, as a hash).
+// Hash of a number, as good as random (the permuted congruential generator of O'Neill 2014).
 fn slope_hash(v: u32) -> u32 {
     let state = v * 747796405u + 2891336453u;
     let word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
@@ -90,7 +89,7 @@ fn slope_normal(g: Decoded, at: vec2<f32>) -> vec3<f32> {
     return vec3<f32>(-g.mean - vec2<f32>(deviation * at.x, shear * at.x + rest * at.y), 1.0);
 }
 
-// What shadows take: `a(wo) Lambda(wi)`; below zero where all is in shadow.
+// Area that shadows take: `a(wo) Lambda(wi)`; below zero where all is in shadow.
 fn shadow(brdf: Brdf, g: Decoded, directions: Directions) -> f32 {
     if brdf.shading != SHADOWED {
         return 0.0;
@@ -144,8 +143,8 @@ fn displaced_diffuse(brdf: Brdf, g: Decoded, directions: Directions) -> f32 {
     return (lit + visible * max(dot(artificial.xyz, directions.wi), 0.0)) / (seen + visible + shadow);
 }
 
-// Light that a filtered texel of a displaced surface sends along the way, per unit of irradiance; `by` is how
-// slopes of the map lie on it.
+// Light that a filtered texel of a displaced surface sends along the path, per unit of irradiance; `by` maps
+// slopes of the map to those on the surface.
 fn reflect_displaced(
     channels: ptr<function, Channels>,
     decoded: ptr<function, Decoded>,

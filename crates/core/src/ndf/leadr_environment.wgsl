@@ -1,7 +1,6 @@
 // A Gaussian of slopes under an environment: LEADR's grid. Twin of `of_slopes` in environment.rs.
 
-// Weight of a slope, for facets that are distributed as those of a lobe are; Gaussian ones weigh as the grid
-// says.
+// Weight of a slope, for facets distributed as a lobe's: Gaussian ones weigh as the grid says.
 fn slope_profile_weight(base: f32, weight: f32, square: f32) -> f32 {
     if GAUSSIAN_FACETS {
         return weight;
@@ -16,7 +15,7 @@ fn mirror_level(g: Decoded, step: f32, z: f32, u: f32) -> f32 {
     return 0.72 * log(jacobian) + GRID_LEVEL + log2(step * deviation * environment.size.x);
 }
 
-// What a facet shows, of normal `n` that faces the eye.
+// Light that a facet shows, whose normal `n` faces the eye.
 fn mirrored(g: Decoded, n: vec3<f32>, step: f32, plain: SurfaceParams, brdf: Brdf, local: LocalEnvironment) -> vec3<f32> {
     let u = dot(n, local.wo);
     let wi = 2.0 * u * n - local.wo;
@@ -24,7 +23,7 @@ fn mirrored(g: Decoded, n: vec3<f32>, step: f32, plain: SurfaceParams, brdf: Brd
     return radiance * lobe_tint(u) * fresnel(brdf.shading, plain.specular, u);
 }
 
-// Facets of a displaced surface: by what the eye sees of each, over what it sees in all.
+// Light of a displaced surface: each facet weighs by what the eye sees of it, over what it sees in all.
 fn mirrors_of_displaced(g: Decoded, plain: SurfaceParams, brdf: Brdf, local: LocalEnvironment) -> vec3<f32> {
     let wo = local.wo;
     var seen = 0.0;
@@ -66,7 +65,7 @@ fn mirrors_of_displaced(g: Decoded, plain: SurfaceParams, brdf: Brdf, local: Loc
     return sum;
 }
 
-// Facets of a normal map; `narrow` is the Gaussian without the lobe's own width.
+// Light of a normal map; `narrow` is the Gaussian without the lobe's own width.
 fn mirrors_of_map(g: Decoded, narrow: Decoded, plain: SurfaceParams, brdf: Brdf, local: LocalEnvironment) -> vec3<f32> {
     let wo = local.wo;
     let base = brdf_width(brdf, plain.roughness);

@@ -1,4 +1,4 @@
-//! The contract of a method: what it says of itself, how it stores and decodes, and the same for callers that
+//! The contract of a method: its properties, how it stores and decodes, and all of this for callers that
 //! choose at run time.
 
 use std::any::Any;
@@ -18,7 +18,7 @@ use crate::shader::{LobeTable, Shader, TABLE_ROUGHNESSES};
 use crate::surface::SurfaceRow;
 use crate::units::SlopeVariance;
 
-/// One fine texel, as a method sees it.
+/// Fine texel, as a method sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Unit normal.
@@ -29,9 +29,9 @@ pub struct Sample {
     pub spread: [f32; 3],
 }
 
-/// What a method says of itself. [`Display`] writes its spelling, in full.
+/// Properties that a method states of itself. [`Display`] writes its spelling, in full.
 pub trait Describe: Debug + Display + Send + Sync {
-    /// What its channels are.
+    /// Encoding of its channels.
     fn encoding(&self) -> Encoding;
 
     /// Form in which its texels are shaded.
@@ -51,12 +51,12 @@ pub trait Describe: Debug + Display + Send + Sync {
         None
     }
 
-    /// False when channels of several texels must not be mixed, and each texel be shaded by itself.
+    /// False when channels of several texels must not be mixed, so that each texel is shaded by itself.
     fn filterable(&self) -> bool {
         true
     }
 
-    /// How the flat map's effective lobe differs from the lobe itself, when it does.
+    /// Effective lobe of a flat map, where that is not the lobe itself.
     fn flat_lobe(&self, _lobe: &dyn Lobe) -> FlatLobe {
         FlatLobe::Exact
     }
@@ -222,14 +222,14 @@ pub trait Method: Describe {
     /// An evaluator for one lobe at fixed directions.
     fn evaluator<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a>;
 
-    /// A BRDF with everything that shading by this method takes of it, for texels of this roughness or
+    /// A BRDF with everything that shading by this method needs of it, for texels of this roughness or
     /// others.
     fn prepare(&self, brdf: &Brdf, roughness: SlopeVariance) -> PreparedBrdf;
 
     /// The light that a texel sends to the eye; see [`FilteredTexel`].
     fn reflect(&self, texel: &FilteredTexel<'_>, lights: &[IncidentLight]) -> DVec3;
 
-    /// The light that a texel sends to the eye of an environment, but for its small bright sources.
+    /// Light of an environment, without its small bright sources, that a texel sends to the eye.
     fn reflect_environment(&self, texel: &FilteredTexel<'_>, local: &LocalEnvironment<'_>) -> DVec3;
 
     /// [`Representation::table`] of a BRDF whose roughness goes from `least` to `most`, as shaders take it.
@@ -242,7 +242,7 @@ pub trait Method: Describe {
     /// True for the same method with the same options.
     fn equals(&self, other: &dyn Method) -> bool;
 
-    /// The method as what it is.
+    /// The method as `Any`, to be cast down to its own type.
     fn as_any(&self) -> &dyn Any;
 }
 
@@ -335,8 +335,8 @@ impl PartialEq for dyn Method {
     }
 }
 
-/// Method of any kind, shared: cloned for nothing, compared by kind and options, read from and written as its
-/// spelling.
+/// Method of any kind, shared. Cloning costs nothing. Methods compare by kind and options, and are read from
+/// and written as their spelling.
 #[derive(Clone)]
 pub struct AnyMethod(Arc<dyn Method>);
 

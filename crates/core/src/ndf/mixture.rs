@@ -1,4 +1,4 @@
-//! What the fitted mixtures share: sums of several lobes, spellings, and an evaluator.
+//! Common parts of the fitted mixtures: sums of several lobes, spellings, and an evaluator.
 
 use glam::DVec3;
 
@@ -37,7 +37,7 @@ impl LobeSums {
         channels.copy_from_slice(self.all().as_flattened());
     }
 
-    /// Every lobe changed by `f`.
+    /// Sums with every lobe changed by `f`.
     pub(super) fn map(mut self, f: impl Fn(&[f32; 4]) -> [f32; 4]) -> Self {
         self.sums[..self.count].iter_mut().for_each(|s| *s = f(s));
         self
@@ -59,12 +59,12 @@ impl LobeSums {
         &self.sums[..self.count]
     }
 
-    /// Those of lobes that say something, with their places.
+    /// Sums of the lobes that say something, with their places.
     pub(super) fn alive(&self) -> impl Iterator<Item = (usize, &[f32; 4])> {
         self.all().iter().enumerate().filter(|(_, s)| s[0] > DEAD)
     }
 
-    /// Weight of those.
+    /// Weight of the lobes that say something.
     pub(super) fn total(&self) -> f64 {
         self.alive().map(|(_, s)| f64::from(s[0])).sum()
     }
@@ -75,7 +75,7 @@ impl LobeSums {
 pub struct NormalLobe {
     /// Its number among the lobes of the texel.
     pub index: usize,
-    /// Share of the texel; they sum to one.
+    /// Share of the texel; shares sum to one.
     pub weight: f64,
     /// Mean direction; for planar lobes `(x, y, 0)`.
     pub mean: DVec3,
@@ -84,7 +84,7 @@ pub struct NormalLobe {
 }
 
 impl NormalLobe {
-    /// A lobe that is all of a texel.
+    /// A lobe that makes up all of a texel.
     pub(super) fn alone(mean: DVec3, variance: SlopeVariance) -> Self {
         Self { index: 0, weight: 1.0, mean, variance }
     }
@@ -152,7 +152,7 @@ pub(super) fn spell(name: &str, fit: &Fit, word: Option<&str>) -> String {
 /// The BRDF's argument for a direction and a lobe's mean.
 pub type Cosine = fn(DVec3, DVec3) -> f64;
 
-/// That of lobes on the sphere.
+/// The BRDF's argument for lobes on the sphere.
 pub(super) fn cosine(w: DVec3, mu: DVec3) -> f64 {
     w.dot(mu)
 }

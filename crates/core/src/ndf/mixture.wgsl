@@ -30,7 +30,7 @@ fn direction(lobe: NormalLobe) -> vec3<f32> {
     return direction_or_up(vec3<f32>(m.xy, z));
 }
 
-// Light that a texel sends along the way, per unit of irradiance.
+// Light that a texel sends along the path, per unit of irradiance.
 fn reflect_texel(
     channels: ptr<function, Channels>,
     lobes: ptr<function, Decoded>,

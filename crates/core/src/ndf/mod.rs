@@ -2,10 +2,10 @@
 //!
 //! `bake → filter → decode → shade`. What is stored and filtered are **sums** ([`Representation::Sums`]),
 //! which mix by plain weighted averaging; what is shaded are decoded parameters ([`Representation::Lobes`]).
-//! They are two types, never one with flags. The typed contract is [`Representation`]; every one of them is
-//! also a [`Method`], the same thing for callers that choose at run time, and [`AnyMethod`] owns one. What is
-//! *stored* ([`Encoding`]) is apart from how it is *read*, and a decoded texel is shaded in one of three
-//! forms ([`Form`]). [`TABLE`] has one row for each method; a row buys the conformance suite in
+//! Sums and lobes are two types, never one with flags. The typed contract is [`Representation`]; every one of
+//! them is also a [`Method`], the same thing for callers that choose at run time, and [`AnyMethod`] owns one.
+//! The form *stored* ([`Encoding`]) is apart from the way it is *read*, and a decoded texel is shaded in one
+//! of three forms ([`Form`]). [`TABLE`] has one row for each method; a row buys the conformance suite in
 //! `conformance.rs`. Notation: `docs/notation.md`.
 
 mod decoded;
@@ -53,7 +53,7 @@ pub use vmf::{Vmf, VmfMixture};
 
 use glam::DVec3;
 
-/// A direction, or `(0,0,1)` for a vector that is none.
+/// Direction of a vector; `(0,0,1)` for a vector that has none.
 fn direction_or_up(v: DVec3) -> DVec3 {
     v.try_normalize().unwrap_or(DVec3::Z)
 }

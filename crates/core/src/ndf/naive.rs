@@ -29,7 +29,7 @@ pub(super) const ROW: Row = Row {
     samples: &["naive"],
 };
 
-/// One direction and nothing else.
+/// A single direction, and nothing else.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnitMean {
     direction: DVec3,

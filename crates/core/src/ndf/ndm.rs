@@ -3,8 +3,8 @@
 //! Mean and covariance of the normals; the base roughness is an initial covariance `v I`, v the lobe's slope
 //! variance, which around a unit mean restricts to a vMF lobe of kappa = 1/v. Density
 //! `k / sqrt|Σ| g(d)`, `d = (w-mu)ᵀ Σ⁻¹ (w-mu)` (their section 6), with three kernels `g` ([`NdmKernel`]) and
-//! three normalisations ([`NdmNormalisation`]). `k` is one constant for a material: what makes the lobe of a
-//! flat map hold the BRDF's energy `rho_0`.
+//! three normalisations ([`NdmNormalisation`]). `k` is one constant for a material, with which the lobe of a
+//! flat map holds the BRDF's energy `rho_0`.
 //!
 //! Stored are the moments about the pole, of `n - (0,0,1)`: as linear as those about the origin, the same
 //! covariance, and in half floats without the cancellation of `E[z²] - E[z]²` near 1 (the test
@@ -41,7 +41,7 @@ pub enum NdmKernel {
     Pearson,
 }
 
-/// How the density is made to integrate to one.
+/// Normalisation: the way in which the density is made to integrate to one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum NdmNormalisation {
     /// `1/sqrt|Σ|` and no more: the paper's own pictures.
@@ -103,14 +103,14 @@ fn parse(words: &[&str]) -> Result<AnyMethod, ParameterError> {
     Ndm::new(kernel.unwrap_or_default(), normalisation.unwrap_or_default()).map(AnyMethod::from)
 }
 
-/// What is stored: moments of `p = n - (0,0,1)`, and the normalisation factors.
+/// Stored sums: moments of `p = n - (0,0,1)`, and the normalisation factors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoleMoments {
     /// `E[p]`.
     mean: [f32; 3],
     /// `E[p pᵀ]`: xx, yy, zz, xy, xz, yz.
     second: [f32; 6],
-    /// For the roughnesses of [`FACTOR_VARIANCES`]; 1 unless integrated.
+    /// Factors for the roughnesses of [`FACTOR_VARIANCES`]; 1 unless integrated.
     factors: [f32; 3],
 }
 
@@ -210,8 +210,8 @@ impl SpaceGaussian {
         integral / determinant.sqrt() / (kernel.flat_integral(v) / v.powf(1.5))
     }
 
-    /// The stored factors at roughness `v`: the parabola through them in log-log, and beyond the roughnesses
-    /// that have one its value at the nearer end.
+    /// Factor at roughness `v`: the parabola in log-log through the stored ones, and beyond their roughnesses
+    /// its value at the nearer end.
     fn factor(&self, v: f64) -> f64 {
         let x = FACTOR_VARIANCES.map(f64::ln);
         let y = self.factors.map(|f| f.max(1e-6).ln());
@@ -224,7 +224,7 @@ impl SpaceGaussian {
     }
 }
 
-/// The matrix `L D Lᵀ` of a symmetric one, with the pivots held at `floor` or above.
+/// The matrix `L D Lᵀ` of a symmetric matrix, with the pivots held at `floor` or above.
 ///
 /// A covariance plus `floor` times the identity has no pivot below `floor`. Rounding of the stored moments
 /// can make the covariance indefinite, which a sharp lobe's small roughness does not mend; this does, and
@@ -264,7 +264,7 @@ impl Describe for Ndm {
     }
 
     fn reads(&self, stored: &Encoding) -> bool {
-        // Factors that it does not want do no harm.
+        // Factors that a method does not use do no harm.
         let integrated = self.normalisation == NdmNormalisation::Integrated;
         matches!(stored, Encoding::PoleMoments { .. }) && (!integrated || self.encoding() == *stored)
     }
@@ -392,7 +392,7 @@ impl Ndm {
         Ok(Self { kernel, normalisation })
     }
 
-    /// The effective lobe; `energy` is that of the BRDF, where the kernel is not its own.
+    /// The effective lobe; `energy` is that of the BRDF, for a kernel that is not the BRDF's own.
     fn effective_of<'a>(
         self,
         g: SpaceGaussian,

@@ -93,7 +93,7 @@ fn plane_integral() -> f32 {
     return select(2.0 * PI, 2.0 * PI * PEARSON_M / (PEARSON_M + 1.0), KERNEL == PEARSON);
 }
 
-// The stored factors at roughness `v`: the parabola through them in log-log, held to its ends.
+// Factor at roughness `v`: the parabola in log-log through the stored ones, held to its ends.
 fn stored_factor(factors: vec3<f32>, v: f32) -> f32 {
     let x = log(vec3<f32>(1.0 / 8.0, 1.0 / 128.0, 1.0 / 2048.0));
     let y = log(max(factors, vec3<f32>(1e-6)));

@@ -1,9 +1,9 @@
-//! Shading a filtered texel: what its normals together send to the eye.
+//! Shading a filtered texel: the light that its normals together send to the eye.
 //!
-//! The mean over normals of `f(wh·n) c(n)` (`brdf.rs`). f is the effective lobe's business. c varies slowly,
-//! and is taken at the normals that answer: those of lobe j that f picks, of mean `mu_j/v_j + wh/b`, b the
-//! variance of f, as for a product of two Gaussians. The papers take c at `mu_j`; for a lobe wider than f
-//! that is not where the light comes from.
+//! The mean over normals of `f(wh·n) c(n)` (`brdf/shading.rs`). f is the effective lobe's business. c varies
+//! slowly, and is taken at the normals that answer: those of lobe j that f picks, of mean `mu_j/v_j + wh/b`,
+//! b the variance of f, as for a product of two Gaussians. The papers take c at `mu_j`; for a lobe wider than
+//! f that is not where the light comes from.
 
 use std::f64::consts::PI;
 
@@ -13,16 +13,16 @@ use super::{Cosine, Form, NormalLobe, Representation, leadr};
 use crate::brdf::{AnyLobe, Brdf, Directions, Lambert, SurfaceParams, Widen};
 use crate::units::SlopeVariance;
 
-/// A light's way to the eye, and its irradiance on a plane that faces it, in linear RGB.
+/// Incident light: its path to the eye, and its irradiance on a plane that faces it, in linear RGB.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IncidentLight {
-    /// The way.
+    /// Path from the light to the eye.
     pub directions: Directions,
-    /// The irradiance.
+    /// Irradiance that comes along it.
     pub irradiance: DVec3,
 }
 
-/// What shading wants to know of a material, made once by [`super::Method::prepare`].
+/// Material prepared for shading, made once by [`super::Method::prepare`].
 pub struct PreparedBrdf {
     /// The material's BRDF.
     pub(super) brdf: Brdf,
@@ -49,12 +49,12 @@ impl PreparedBrdf {
 pub struct FilteredTexel<'a> {
     /// Channels as filtered, four a layer.
     pub channels: &'a [f32],
-    /// What it is made of: under one of its lobes, or (`None`) over all.
+    /// Surface parameters: under one of its lobes, or (`None`) over all.
     pub params: &'a dyn Fn(Option<usize>) -> SurfaceParams,
-    /// What was prepared for the material.
+    /// The material, prepared for shading.
     pub prepared: &'a PreparedBrdf,
-    /// Shade as the papers print it: factors at the lobes' means; for displaced surfaces, the rational form
-    /// of masking.
+    /// True to shade as the papers print it: factors at the lobes' means; for displaced surfaces, the
+    /// rational form of masking.
     pub at_means: bool,
     /// For a displaced surface, how slopes of the map lie on it; `None` for a normal map.
     pub slope_map: Option<DMat2>,
@@ -88,7 +88,7 @@ fn of_whole<R: Representation>(
 ) -> DVec3 {
     let params = (texel.params)(None);
     let PreparedBrdf { brdf, roughness, lobe, table, diffuse_table } = texel.prepared;
-    // Where a roughness map says something else than what was prepared for, the lobe is made anew.
+    // Where a roughness map differs from the roughness prepared for, the lobe is made anew.
     let own = (params.roughness != *roughness).then(|| brdf.lobe.widen(params.roughness));
     let lobe = match &own {
         Some(own) => representation.effective(decoded, &**own),
@@ -159,7 +159,7 @@ pub(super) struct Answer {
 }
 
 impl Answer {
-    /// Colours on both parts.
+    /// Light of both parts, with their colours.
     pub(super) fn coloured(&self, brdf: &Brdf, params: &SurfaceParams, directions: &Directions) -> DVec3 {
         let diffuse = params.diffuse * (self.diffuse.max(0.0) / PI);
         if !brdf.is_specular() {

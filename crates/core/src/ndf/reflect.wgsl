@@ -1,4 +1,4 @@
-// Shading a filtered texel, what all methods share. Twin of reflect.rs.
+// Shading a filtered texel: the parts that all methods share. Twin of reflect.rs.
 
 // A texel's channels: the method's LAYERS, then, for LOBES that carry them, ATTRIBUTES times as many of
 // colours.
@@ -38,7 +38,7 @@ fn combine(brdf: Brdf, params: SurfaceParams, directions: Directions, specular: 
     return lobe_tint(directions.u) * f * max(specular, 0.0) + diffuse_share(brdf.shading, f) * lambert;
 }
 
-// What a lobe is made of: what it carries, or `plain` where lobes carry nothing.
+// Surface parameters of a lobe: those it carries, or `plain` where lobes carry none.
 fn params_of(channels: ptr<function, Channels>, lobe: u32, plain: SurfaceParams) -> SurfaceParams {
     var params = plain;
     if ATTRIBUTES > 0u {

@@ -1,7 +1,7 @@
 //! `sh:L`: the distribution in real spherical harmonics up to order L. Han et al. 2007, section 5.
 //!
 //! `gamma_lm = E[Y_lm(n)]`; the effective lobe is `Σ rho_l gamma_lm Y_lm(w)`, exact up to the cut at L, with
-//! the lobe's zonal coefficients `rho_l`. What rings below zero is clamped to zero. `sh:L:printed` uses the
+//! the lobe's zonal coefficients `rho_l`. Ringing below zero is clamped to zero. `sh:L:printed` uses the
 //! paper's `exp` approximations of `rho_l` in place of the exact ones, to show the difference.
 
 use std::fmt::{self, Display};
@@ -67,7 +67,7 @@ impl Sh {
         counted(order, "order", 2..=MAX_SH_ORDER, "sh:7").map(|order| Self { order, printed: false })
     }
 
-    /// The same, with the paper's approximations of a lobe's zonal coefficients.
+    /// Returns it with the paper's approximations of a lobe's zonal coefficients.
     #[must_use]
     pub fn printed(self) -> Self {
         Self { printed: true, ..self }
@@ -78,7 +78,7 @@ impl Sh {
         printed.unwrap_or_else(|| lobe.zonal(self.order))
     }
 
-    /// `rho_l Y_lm(w)` for every l and m: what the stored coefficients are multiplied with.
+    /// `rho_l Y_lm(w)` for every l and m: the weights of the stored coefficients.
     fn weights(&self, rho: &[f64], w: DVec3) -> Vec<f64> {
         let mut weights = vec![0.0; sh_count(self.order)];
         spherical_harmonics(self.order, w, &mut weights);
@@ -95,7 +95,7 @@ fn clamped_dot(weights: &[f64], gamma: &[f32]) -> f64 {
 }
 
 struct ShEvaluator {
-    /// One run of [`sh_count`] weights a direction.
+    /// Weights, a run of [`sh_count`] for each direction.
     weights: Vec<f64>,
     count: usize,
 }

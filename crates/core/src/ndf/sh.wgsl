@@ -35,7 +35,7 @@ fn series(gamma: ptr<function, Decoded>, rho: ptr<function, array<f32, TABLE>>, 
         }
         power = next_power(power, w);
     }
-    // What rings below zero is held there.
+    // Ringing below zero is clamped to zero.
     return max(sum, 0.0);
 }
 

@@ -39,7 +39,7 @@ impl Slopes {
         Self { grid: SlopeGrid::new(5) }
     }
 
-    /// Environments and diffuse facets of displaced surfaces averaged over `n` × `n` slopes, n from 5 to 128.
+    /// Averages environments and diffuse facets of displaced surfaces over `n` × `n` slopes, n from 5 to 128.
     ///
     /// # Errors
     /// [`ParameterError::Count`] for another `n`.
@@ -47,7 +47,7 @@ impl Slopes {
         counted(n, "number of slopes", 5..=128, "slopes:9").map(|n| Self { grid: SlopeGrid::new(n) })
     }
 
-    /// The same number of slopes, drawn at random.
+    /// Returns it with as many slopes, drawn at random.
     #[must_use]
     pub fn drawn(self) -> Self {
         Self { grid: SlopeGrid::drawn(self.grid.len()) }
@@ -79,7 +79,7 @@ fn parse(words: &[&str]) -> Result<AnyMethod, ParameterError> {
     Ok(AnyMethod::from(slopes))
 }
 
-/// What is stored: means of height, slope and products of slopes.
+/// Stored sums: means of height, slope and products of slopes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SlopeMoments {
     /// `E[h]` in texture widths.
@@ -177,7 +177,7 @@ fn moments_of_row(row: &SurfaceRow, first: &mut [[f32; 4]], second: &mut [[f32; 
         *first = [*height, s.x, s.y, 1.0];
         *second = [s.x * s.x, s.y * s.y, s.x * s.y, 1.0];
     }
-    // What slopes stray within a texel, where the surface knows.
+    // The spread of slopes within a texel, where the surface knows it.
     for (second, spread) in second.iter_mut().zip(&row.spread) {
         second.iter_mut().zip(spread).for_each(|(s, within)| *s += within);
     }

@@ -9,11 +9,11 @@ use super::{AnyMethod, Representation, fixed, gmm, naive, ndm, phong, sh, slopes
 pub struct Row {
     /// The word before the first colon.
     pub name: &'static str,
-    /// What may follow it, for help.
+    /// Parameters that may follow the name, for help.
     pub parameters: &'static str,
-    /// One line for help and docs.
+    /// Summary in one line, for help and docs.
     pub summary: &'static str,
-    /// Where it was published.
+    /// Paper that published it.
     pub paper: &'static str,
     /// Reads what follows the name, split at colons.
     pub parse: fn(&[&str]) -> Result<AnyMethod, ParameterError>,
@@ -25,26 +25,26 @@ pub struct Row {
 pub static TABLE: &[Row] =
     &[fixed::ROW, naive::ROW, toksvig::ROW, ndm::ROW, slopes::ROW, sh::ROW, vmf::ROW, gmm::ROW, phong::ROW];
 
-/// Parameter of a method that is out of its range, or a word that says nothing to it.
+/// Parameter of a method that is out of its range, or a word that it does not know.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParameterError {
     /// A count that is no whole number in its range.
     #[error("the {what} must be a whole number from {least} to {most}, as in `{example}`")]
     Count {
-        /// What is counted.
+        /// Quantity that is counted.
         what: &'static str,
         /// Least count.
         least: usize,
         /// Largest count.
         most: usize,
-        /// A spelling that is right.
+        /// Example of a right spelling.
         example: &'static str,
     },
     /// Factors of a lobe that is not known when baking.
     #[error("factors are integrated before the BRDF is known: name `gaussian` or `pearson`")]
     UnknownLobe,
-    /// Words that say nothing to the method.
+    /// Words that the method does not know.
     #[error("{0}")]
     Words(String),
 }
@@ -60,7 +60,7 @@ pub(super) fn counted(
     if range.contains(&count) { Ok(count) } else { Err(ParameterError::Count { what, least, most, example }) }
 }
 
-/// A word as a count; 0, which is in no range, for a word that is none.
+/// A word as a count; 0, which is in no range, for a word that is not a count.
 pub(super) fn count_of(word: Option<&&str>) -> usize {
     word.and_then(|word| word.parse().ok()).unwrap_or(0)
 }
@@ -84,12 +84,12 @@ pub enum ParseMethodError {
     /// No row of the table has this name.
     #[error("there is no method called `{0}`")]
     Unknown(String),
-    /// What follows the name is wrong.
+    /// The parameters that follow the name are wrong.
     #[error("method `{spelling}`: {reason}")]
     Parameter {
-        /// What was written.
+        /// Spelling as it was written.
         spelling: String,
-        /// What is wrong.
+        /// Reason why it is wrong.
         reason: ParameterError,
     },
 }

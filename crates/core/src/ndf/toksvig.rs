@@ -1,8 +1,8 @@
 //! `toksvig`: the mean normal, whose shortening widens the lobe. Toksvig 2005, "Mipmapping Normal Maps".
 //!
 //! With `L = |E[n]|`, Blinn-Phong's exponent becomes `f_t s`, `f_t = L/(L + s(1-L))`, scaled by
-//! `(1 + f_t s)/(1 + s)`. That is a convolution with a lobe of slope variance `(1-L)/L`, which is how the
-//! rule is carried to every other BRDF; for normalised Blinn-Phong it is the printed formula exactly.
+//! `(1 + f_t s)/(1 + s)`. That is a convolution with a lobe of slope variance `(1-L)/L`, and so the rule is
+//! carried to every other BRDF; for normalised Blinn-Phong it is the printed formula exactly.
 
 use std::fmt::{self, Display};
 
@@ -17,7 +17,7 @@ use crate::brdf::Lobe;
 use crate::shader::Shader;
 use crate::units::SlopeVariance;
 
-/// One isotropic lobe from the length of the mean normal.
+/// Toksvig's rule: a single isotropic lobe from the length of the mean normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Toksvig;
 

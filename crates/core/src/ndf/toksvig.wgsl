@@ -1,4 +1,4 @@
-// One isotropic lobe from the length of the mean normal. Twin of toksvig.rs.
+// A single isotropic lobe from the length of the mean normal. Twin of toksvig.rs.
 
 const NORMALISED: bool = false;
 

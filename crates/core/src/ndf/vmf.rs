@@ -28,7 +28,7 @@ use crate::units::SlopeVariance;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vmf {
     fit: Fit,
-    /// Stored as the paper has it.
+    /// True when stored as the paper has it.
     origin: bool,
 }
 
@@ -69,14 +69,14 @@ impl Vmf {
         Ok(Self { fit, origin: false })
     }
 
-    /// The same, lobes of neighbours made to correspond in another way.
+    /// Returns it with another way of making lobes of neighbours correspond.
     #[must_use]
     pub fn alignment(mut self, alignment: Alignment) -> Self {
         self.fit.alignment = alignment;
         self
     }
 
-    /// The same, stored about the origin, as the paper has it.
+    /// Returns it stored about the origin, as the paper has it.
     #[must_use]
     pub fn about_origin(self) -> Self {
         Self { origin: true, ..self }

@@ -4,7 +4,7 @@
 // A method brings `Decoded`, `decode`, `mean_normal`, `effective` (around the half-vector) and
 // `effective_diffuse`.
 
-// Light that a texel sends along the way, per unit of irradiance.
+// Light that a texel sends along the path, per unit of irradiance.
 fn reflect_texel(
     channels: ptr<function, Channels>,
     decoded: ptr<function, Decoded>,

@@ -5,7 +5,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::{Row, aspect, height_field};
 
-/// One family of parallel folds: a triangle wave over whole wave numbers, which tiles.
+/// Family of parallel folds: a triangle wave over whole wave numbers, which tiles.
 struct Fold {
     u: f64,
     v: f64,

@@ -22,9 +22,9 @@ use crate::surface::{HeightField, SlopeFilter, Surface, Wraps};
 
 /// A row of [`TABLE`].
 pub struct Row {
-    /// What follows `builtin:`.
+    /// Name on the command line, after `builtin:`.
     pub name: &'static str,
-    /// One line for help and docs.
+    /// Summary in one line, for help and docs.
     pub summary: &'static str,
     /// Makes the surface at a size.
     pub build: fn(Size) -> Box<dyn Surface>,

@@ -1,11 +1,11 @@
 //! Gaussian noise on a sphere, as a height map of longitude and latitude: the primitive of Dupuy et al. 2013,
 //! figure 4.
 //!
-//! Slopes have the same deviations in the local frame everywhere on the sphere, whatever the map makes of it
-//! near the poles. A sum of wave packets (Lagae et al. 2009, "Procedural noise using sparse Gabor
-//! convolution", whose kernels these are): each a cosine of random phase under a Gaussian, its wave vector
-//! turned at random in the frame of its own place, all of one length on an ellipse. Many overlap at every
-//! point, and so height and slopes are Gaussian.
+//! Slopes have the same deviations in the local frame everywhere on the sphere, however the map is stretched
+//! near the poles. The height is a sum of wave packets (Lagae et al. 2009, "Procedural noise using sparse
+//! Gabor convolution", whose kernels these are): each a cosine of random phase under a Gaussian, its wave
+//! vector turned at random in the frame of its own place, all of one length on an ellipse. Many overlap at
+//! every point, and so height and slopes are Gaussian.
 
 use std::f64::consts::{PI, TAU};
 
@@ -23,10 +23,10 @@ const WAVE: f64 = 12.0;
 /// Wave packets that overlap at a point, in units of their own area, 2 pi radius².
 const OVERLAP: f64 = 16.0;
 
-/// Where a packet is cut off, in radii: 1 % of its height.
+/// Distance at which a packet is cut off, in its radii: there it has 1 % of its height.
 const CUT: f64 = 3.0;
 
-/// Which way a sphere is rough.
+/// Grain of a rough sphere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grain {
     /// Alike on all sides.
@@ -53,7 +53,7 @@ impl Grain {
 struct Packet {
     longitude: f64,
     latitude: f64,
-    /// The same on the sphere.
+    /// Place on the unit sphere.
     at: DVec3,
     /// Wave vector, eastward and northward.
     wave: DVec2,
@@ -67,7 +67,7 @@ struct Packet {
 /// wave has twelve texels at the equator.
 #[must_use]
 pub fn sphere_noise(size: Size, deviations: DVec2, depth: f64, seed: u64) -> HeightField {
-    // Of the longest wave vector, per radian; a packet is as wide as a wave is long.
+    // Wave number of the longest wave vector, per radian; a packet is as wide as a wave is long.
     let number = (size.width as f64 / WAVE).max(2.0);
     let radius = TAU / number;
     // Mean square slope of a packet on an axis, over the packet: k²/4 by its waves, turned at random (twice
@@ -180,8 +180,8 @@ mod tests {
                     }
                 }
                 // Central differences of waves of twelve texels lose (2 pi/12)²/6 = 4.6 %, longer ones less
-                // by the square. What chance leaves: some 250 packets' worth of independent places near the
-                // poles, 1/sqrt(250) of the variance; ten times as many elsewhere.
+                // by the square. Chance leaves an error of 1/sqrt(250) of the variance near the poles, which
+                // have some 250 packets' worth of independent places; elsewhere has ten times as many.
                 let lost = DVec2::ONE - 0.046 * (asked / asked.max_element()).powf(2.0);
                 let got = DVec2::new((east / n).sqrt(), (north / n).sqrt()) / lost;
                 assert!(

@@ -1,6 +1,6 @@
 // The look-up of methods whose channels may be mixed: the sampler's own, so set it to linear filtering on all
-// three axes, and to anisotropic filtering where it can be had. Call it where all pixels of a quad do (it
-// takes derivatives).
+// three axes, and to anisotropic filtering where the device has it. Call it where all pixels of a quad do
+// (it takes derivatives).
 
 fn ndf_shade(map: texture_2d_array<f32>, map_sampler: sampler, uv: vec2<f32>, place: NdfPlace) -> vec3<f32> {
     var channels: Channels;

@@ -1,5 +1,5 @@
-// What other programs call. `ndf_shade` looks a place of the map up and shades it; `ndf_shade_channels`
-// shades channels that were looked up otherwise. `ndf_brdf` is the lobe and its model.
+// Functions for other programs to call. `ndf_shade` looks up a place of the map and shades it;
+// `ndf_shade_channels` shades channels that were looked up otherwise. `ndf_brdf` is the lobe and its model.
 
 // A place to be shaded, in its tangent frame: x along u, y against v (v runs down the rows), z out of the
 // surface.

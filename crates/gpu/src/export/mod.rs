@@ -1,4 +1,4 @@
-//! Shaders for other programs: decoding and shading of one method with one lobe, in the languages of others.
+//! Shaders for other programs: decoding and shading of one method with one lobe, in several languages.
 //!
 //! In [`TABLE`] a row is a language. WGSL is our own text, comments and all; the others are written by naga
 //! from the same text, as a library of functions whose names begin with `ndf_`, so that they stand in an
@@ -18,23 +18,23 @@ use crate::link::{Linked, check};
 
 /// A row of [`TABLE`].
 pub struct Language {
-    /// As spelled on the command line.
+    /// Spelling on the command line.
     pub name: &'static str,
-    /// One line for help and docs.
+    /// Summary in one line, for help and docs.
     pub summary: &'static str,
-    /// How the library is called; `None` for what is no text, and no library.
+    /// Call of the library; `None` for a language without text to include, and so without a library.
     call: Option<&'static str>,
     /// Writes a linked library.
     write: fn(&Linked) -> Result<Vec<u8>, String>,
 }
 
-/// A texture and its sampler apart.
+/// Call in languages with texture and sampler apart.
 const WITH_SAMPLER: &str = "ndf_shade(map, map_sampler, uv, place)";
 
-/// A sampler is both.
+/// Call in languages whose samplers are textures too.
 const COMBINED: &str = "ndf_shade(map, uv, place)";
 
-/// Every language there is.
+/// Every language.
 pub static TABLE: &[Language] = &[
     Language {
         name: "wgsl",
@@ -71,20 +71,20 @@ pub static TABLE: &[Language] = &[
 
 /// A shader to be exported.
 pub struct Export<'a> {
-    /// The method, whose baked map the shader reads.
+    /// Method whose baked map the shader reads.
     pub method: &'a dyn Method,
-    /// Lobe and model.
+    /// Lobe and its shading model.
     pub brdf: &'a Brdf,
 }
 
 impl Export<'_> {
-    /// The shader in a language.
+    /// Writes the shader in a language.
     ///
     /// # Errors
-    /// [`GpuError::Shader`] when the language cannot say it.
+    /// [`GpuError::Shader`] when the language cannot express the shader.
     pub fn to(&self, language: &Language) -> Result<Vec<u8>, GpuError> {
         let library = self.library();
-        // Text that is handed out as it is needs no entry point; naga wants one, to see what is used.
+        // Our own text needs no entry point; naga wants one, to see which functions are used.
         let entry = include_str!("entry.wgsl");
         let linked = if language.name == "wgsl" { check(library)? } else { check(library + "\n" + entry)? };
         let body = (language.write)(&linked)
@@ -98,7 +98,7 @@ impl Export<'_> {
         Ok([head.into_bytes(), body].concat())
     }
 
-    /// The linked text of the library, without an entry point.
+    /// Linked text of the library, without an entry point.
     fn library(&self) -> String {
         let lobe = &*self.brdf.lobe;
         let (least, most) = (SlopeVariance::ZERO, SlopeVariance::ZERO);
@@ -127,7 +127,7 @@ impl Export<'_> {
         [&method, lookup, &brdf, library, own].join("\n")
     }
 
-    /// What the file begins with.
+    /// Text at the head of the file.
     fn head(&self, call: &str) -> String {
         let sampler = if self.method.filterable() {
             "a sampler that filters linearly on all three axes"
@@ -150,7 +150,7 @@ impl Export<'_> {
     }
 }
 
-/// The module with names that clash with nobody's, and nothing that is not used.
+/// Returns the module under names that clash with nobody's, without unused parts.
 fn private(linked: &Linked) -> Result<(naga::Module, naga::valid::ModuleInfo), String> {
     let mut module = linked.module.clone();
     compact(&mut module, KeepUnused::No);
@@ -178,7 +178,8 @@ fn private(linked: &Linked) -> Result<(naga::Module, naga::valid::ModuleInfo), S
     Ok((module, info))
 }
 
-/// The same as a library: without the entry point, which only told what is used, and what it binds.
+/// Returns the module as a library: without the entry point, which only told what is used, and without its
+/// bindings.
 fn library(linked: &Linked) -> Result<(naga::Module, naga::valid::ModuleInfo), String> {
     let (mut module, _) = private(linked)?;
     module.entry_points.clear();
@@ -191,7 +192,7 @@ fn library(linked: &Linked) -> Result<(naga::Module, naga::valid::ModuleInfo), S
     Ok((module, info))
 }
 
-/// What GLSL ES has no default for.
+/// Precision of array textures, for which GLSL ES has no default.
 const ES_PRECISION: &str = "precision highp sampler2DArray;\n";
 
 fn glsl(linked: &Linked, version: back::glsl::Version, before: &str) -> Result<Vec<u8>, String> {
@@ -207,7 +208,7 @@ fn glsl(linked: &Linked, version: back::glsl::Version, before: &str) -> Result<V
     back::glsl::Writer::new(&mut text, &module, &info, &options, &pipeline, policies)
         .and_then(|mut writer| writer.write())
         .map_err(|e| e.to_string())?;
-    // The functions alone: what comes before `main`, less the version, and less what only `main` binds, reads
+    // Only the functions: the text before `main`, without the version and all that only `main` binds, reads
     // and writes.
     let functions = text.split("void main()").next().unwrap_or_default();
     let own = |line: &&str| {

@@ -1,6 +1,6 @@
-// The look-up of methods whose channels must not be mixed: each of the eight texels around is shaded, and the
-// light is mixed. The map repeats; the sampler is not used. Call it where all pixels of a quad do (it takes
-// derivatives).
+// The look-up of methods whose channels must not be mixed: it shades each of the eight texels around and
+// mixes their light. The map repeats; the sampler is not used. Call it where all pixels of a quad do (it
+// takes derivatives).
 
 fn ndf_shade(map: texture_2d_array<f32>, map_sampler: sampler, uv: vec2<f32>, place: NdfPlace) -> vec3<f32> {
     let levels = level_count(textureDimensions(map));

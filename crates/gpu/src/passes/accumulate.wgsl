@@ -3,7 +3,7 @@
 struct Weights {
     keep: f32,
     add: f32,
-    // 1: only where `mask` is not 0.
+    // 1 to add only where `mask` is not 0.
     masked: u32,
     unused: u32,
 }
@@ -24,7 +24,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if weights.masked == 1u && textureLoad(mask, at, 0).x == 0u {
         return;
     }
-    // What is not kept is not read either: it may be no number.
+    // Sums that are not kept are not read either: they may be NaN.
     let before = select(weights.keep * sums[i], vec4<f32>(0.0), weights.keep == 0.0);
     sums[i] = before + weights.add * textureLoad(picture, at, 0);
 }

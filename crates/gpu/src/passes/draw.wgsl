@@ -5,7 +5,7 @@
 @group(1) @binding(2) var params_map: texture_2d_array<f32>;
 @group(1) @binding(3) var linear: sampler;
 
-// What a place is made of, where lobes do not say so themselves.
+// Surface parameters of a place, where lobes do not carry their own.
 fn material_params(diffuse_roughness: vec4<f32>, specular: vec4<f32>) -> SurfaceParams {
     var params = material.plain;
     if material.mapped > 0u {
@@ -18,11 +18,11 @@ fn material_params(diffuse_roughness: vec4<f32>, specular: vec4<f32>) -> Surface
     return params;
 }
 
-// The light of all lights from a texel.
+// Radiance of a texel under all lights.
 fn shade(place: Place, channels: ptr<function, Channels>, plain: SurfaceParams) -> vec3<f32> {
     var decoded = decode(channels);
     var sum = vec3<f32>(0.0);
-    // A facet of relief may face what its base turns its back on.
+    // A facet of relief may face lights and eyes that its base turns its back on.
     let displaced = KNOWS_DISPLACEMENT && place.displaced;
     if place.wo.z <= 0.0 && !displaced {
         return sum;
@@ -30,7 +30,7 @@ fn shade(place: Place, channels: ptr<function, Channels>, plain: SurfaceParams) 
     for (var i = 0u; i < view.lights; i++) {
         let light = seen_from(place, i);
         let across = light.wi + place.wo;
-        // A light right behind what is seen has no half-vector.
+        // A light opposite the eye has no half-vector.
         if dot(across, across) < 1e-12 {
             continue;
         }
@@ -54,7 +54,7 @@ fn taps_of(place: Place) -> Taps {
     return taps(PixelFootprint(place.uv, place.duv_dx, place.duv_dy), material.texels, filtering);
 }
 
-// Colours by the filter's taps.
+// Colours, filtered by the taps.
 fn filtered_params(around: Taps) -> SurfaceParams {
     var colours = array<vec4<f32>, 2>();
     let share = 1.0 / f32(around.columns * around.rows);
@@ -66,7 +66,7 @@ fn filtered_params(around: Taps) -> SurfaceParams {
     return material_params(colours[0], colours[1]);
 }
 
-// A colour that the target can hold: half floats would make infinity of what a sharp lobe reflects.
+// A colour that the target can hold: half floats would turn the light of a sharp lobe into infinity.
 fn held(colour: vec3<f32>) -> vec4<f32> {
     return vec4<f32>(min(colour, vec3<f32>(view.brightest)), 1.0);
 }
@@ -111,7 +111,8 @@ fn sampled(in: Varying) -> @location(0) vec4<f32> {
     return held(shade(place, &channels, material_params(colours[0], colours[1])));
 }
 
-// Every texel that the filter reads is shaded by itself: for what must not be mixed, or is not aligned.
+// Every texel that the filter reads is shaded by itself: for channels that must not be mixed, and lobes that
+// are not aligned.
 @fragment
 fn neighbours(in: Varying) -> @location(0) vec4<f32> {
     if masked_out(in.pixel) {

@@ -1,11 +1,11 @@
-// What the drawing pass brings to an environment's shading: its uniform, its cubes, and its tables.
+// Bindings that the drawing pass brings to an environment's shading: its uniform, its cubes, and its tables.
 
 @group(0) @binding(6) var<uniform> environment: Environment;
 @group(0) @binding(7) var radiance_cube: texture_2d_array<f32>;
 @group(0) @binding(8) var half_vectors: texture_2d<f32>;
 @group(0) @binding(9) var cube_linear: sampler;
 
-// Of the material: what it reflects of a white sky, and the cubes that facets like its own have blurred.
+// The material's: reflectance under a white sky, and the cubes that facets like its own have blurred.
 @group(1) @binding(4) var split_sums: texture_2d<f32>;
 @group(1) @binding(5) var blurred_cube: texture_2d_array<f32>;
 

@@ -27,7 +27,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let normal = cross(p, q);
     let square = dot(normal, normal);
     if square <= 0.0 {
-        // An edge's points moved together: it is drawn nowhere.
+        // The points of an edge have moved together: the triangle is drawn nowhere.
         triangles[at] = Triangle(vec4<f32>(0.0, 1.0, 0.0, f32(cut.object)), vec4<f32>(0.0, 0.0, 0.0, 1.0), vec4<f32>(0.0));
         return;
     }

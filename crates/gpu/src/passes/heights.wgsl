@@ -1,14 +1,14 @@
-// Cuts meshes with relief: what the passes that do it share. Heights lie in a buffer, level after level.
+// Common part of the passes that cut meshes with relief. Heights lie in a buffer, level after level.
 
 struct Cut {
-    // Where the eye is, relative to the scene's middle.
+    // Position of the eye, relative to the scene's middle.
     eye: vec3<f32>,
     // World width that heights are taken at, at distance 1.
     width: f32,
     // Texels of the finest heights.
     texels: vec2<u32>,
     levels: u32,
-    // Which axes repeat: 1 the first, 2 the second.
+    // Axes that repeat: 1 the first, 2 the second.
     repeat: u32,
     // World length of a height of one texture width.
     depth: f32,

@@ -1,4 +1,4 @@
-// What the passes that shade know of a material, the same for all its pixels.
+// Material, as the passes that shade know it, the same for all its pixels.
 
 struct Material {
     plain: SurfaceParams,
@@ -6,7 +6,7 @@ struct Material {
     texels: vec2<f32>,
     // Colours in `params`: 0 none, 1 albedo and roughness, 2 specular colour as well.
     mapped: u32,
-    // Which axes repeat: 1 the first, 2 the second.
+    // Axes that repeat: 1 the first, 2 the second.
     repeat: u32,
     brdf: Brdf,
 }

@@ -1,5 +1,5 @@
-// Marks pixels with an outline in them: where the pixels around show something else than the pixel's own
-// surface goes on to. Twin of `outline` in the CPU renderer.
+// Marks pixels with an outline in them: where the pixels around do not continue the pixel's own surface. Twin
+// of `outline` in the CPU renderer.
 
 @group(0) @binding(0) var places: texture_2d<f32>;
 @group(0) @binding(1) var faces: texture_2d<f32>;

@@ -1,5 +1,5 @@
-// Draws what is seen where: for each pixel its place and object, its face and distance. Outlines are found in
-// it.
+// Draws for each pixel the place and object that it sees, their face and distance. Outlines are found in
+// these.
 
 struct Surface {
     @location(0) place: vec4<f32>,

@@ -51,7 +51,7 @@ fn height(uv: vec2<f32>, over: f32) -> f32 {
     return mix(fine, coarse, lod - f32(level)) * cut.depth;
 }
 
-// The direction of `v`, or another where it has none.
+// The direction of `v`, or `other` where `v` has none.
 fn unit_or(v: vec3<f32>, other: vec3<f32>) -> vec3<f32> {
     let square = dot(v, v);
     return select(other, v * inverseSqrt(max(square, 1e-30)), square > 1e-30);

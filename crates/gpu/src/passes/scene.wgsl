@@ -1,23 +1,23 @@
-// What the passes that draw share: the camera, the lights, the triangles, and the surface under a pixel.
+// Common part of the passes that draw: the camera, the lights, the triangles, and the surface under a pixel.
 //
 // Vertices are pulled from storage, so that a fragment knows its whole triangle: its face, and how the place
-// on the map moves in its plane. The twin is `Geometry` of the CPU renderer, which this must see alike.
+// on the map moves in its plane. The twin is `Geometry` of the CPU renderer: both must see alike.
 
 struct View {
     // Clip space from a place relative to the eye.
     clip: mat4x4<f32>,
-    // Where the rays start, as places are: relative to the scene's middle.
+    // Origin of the rays, like all places relative to the scene's middle.
     eye: vec3<f32>,
-    // How many lights.
+    // Number of lights.
     lights: u32,
     // The ray through a place (x, y) in the picture is corner + x right + y down.
     corner: vec3<f32>,
-    // Width of what is shaded, in pixels.
+    // Width of the area that is shaded, in pixels.
     width: f32,
     right: vec3<f32>,
     seed: u32,
     down: vec3<f32>,
-    // 1: only where `mask` is not 0.
+    // 1 to draw only where `mask` is not 0.
     masked: u32,
     // The filter, as `Filtering` has it.
     max_taps: u32,
@@ -28,7 +28,7 @@ struct View {
 }
 
 struct Light {
-    // Unit vector to the light (w = 0), or where it is (w = 1).
+    // Unit vector to the light (w = 0), or its position (w = 1).
     place: vec4<f32>,
     // Irradiance on a plane that faces it, or radiant intensity. w = 1: of an environment, whose light
     // normals see from below the base surface, too.
@@ -68,18 +68,18 @@ fn project(@builtin(vertex_index) i: u32) -> Varying {
     return Varying(clip, v.position_u.xyz, v.normal_v.xyz, v.tangent.xyz, uv, first.tangent.w, i / 3u, v.stretch);
 }
 
-// What lies under a pixel.
+// Surface under a pixel.
 struct Place {
     position: vec3<f32>,
     // Tangent, bitangent, normal as columns; the normal faces the eye.
     frame: mat3x3<f32>,
-    // To the eye, in that frame.
+    // Unit vector to the eye, in that frame.
     wo: vec3<f32>,
     uv: vec2<f32>,
     // Change of uv to the next pixel on the right, and below.
     duv_dx: vec2<f32>,
     duv_dy: vec2<f32>,
-    // On a mesh with relief, how slopes of the map lie in the frame.
+    // True on a mesh with relief; `stretch` then takes slopes of the map to the frame.
     displaced: bool,
     stretch: mat2x2<f32>,
 }
@@ -91,7 +91,7 @@ fn reject(v: vec3<f32>, n: vec3<f32>) -> vec3<f32> {
     return v - n * dot(v, n);
 }
 
-// How far the place moves as the pixel moves by `step` (Igehy 1999).
+// Change of the place as the pixel moves by `step` (Igehy 1999).
 fn differential(step: vec3<f32>, ray: vec3<f32>, face: vec3<f32>, distance: f32) -> vec3<f32> {
     let along = dot(ray, face);
     let held = select(along, 1e-9, abs(along) < 1e-9);
@@ -105,7 +105,7 @@ fn place_of(in: Varying, unbent: bool) -> Place {
     let direction = normalize(ray);
     let side = select(1.0, -1.0, dot(triangle.face.xyz, direction) > 0.0);
     var normal = normalize(in.normal) * side;
-    // Where the normal between corners has turned away from the eye, it is bent back until it just does not.
+    // An interpolated normal that has turned away from the eye is bent back until it just faces it.
     let facing = -dot(normal, direction);
     let displaced = triangle.grad_u.w == 1.0;
     if facing < LEAST_FACING && !(unbent && displaced) {
@@ -128,7 +128,7 @@ fn place_of(in: Varying, unbent: bool) -> Place {
         vec2<f32>(dot(triangle.grad_u.xyz, dx), dot(triangle.grad_v.xyz, dx)),
         vec2<f32>(dot(triangle.grad_u.xyz, dy), dot(triangle.grad_v.xyz, dy)),
         displaced,
-        // From behind, what stands out goes in, along the turned frame.
+        // Seen from behind, bumps are hollows, along the turned frame.
         mat2x2<f32>(side * in.stretch.x, in.stretch.y, side * in.stretch.z, in.stretch.w),
     );
 }

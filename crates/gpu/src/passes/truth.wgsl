@@ -5,8 +5,7 @@
 @group(1) @binding(1) var normals: texture_2d<f32>;
 @group(1) @binding(2) var params_map: texture_2d_array<f32>;
 
-// A number that is as good as random for each pixel and sample (the permuted congruential generator of
-// O'Neill 2014, as a hash).
+// Random number for each pixel and sample (the permuted congruential generator of O'Neill 2014, as a hash).
 fn hash(v: u32) -> u32 {
     let state = v * 747796405u + 2891336453u;
     let word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
@@ -28,8 +27,8 @@ fn wrapped(t: f32, n: f32, repeat: bool) -> i32 {
 @fragment
 fn truth(in: Varying) -> @location(0) vec4<f32> {
     let place = place_of(in, false);
-    // The bilinear mix of what texels reflect: the texel under a point displaced by up to half a texel either
-    // way.
+    // The mean over samples is the bilinear mix of the texels' light: each takes the texel under a point
+    // displaced by up to half a texel either way.
     let displaced = vec2<f32>(random(in.pixel.xy, 0u), random(in.pixel.xy, 1u)) - 0.5;
     let at = place.uv * material.texels + displaced;
     let x = wrapped(at.x, material.texels.x, (material.repeat & 1u) != 0u);

@@ -1,5 +1,5 @@
-// Vertices and triangles as they lie in buffers: written by the passes that cut meshes, or from the CPU, and
-// read by those that draw.
+// Vertices and triangles as they lie in buffers. The passes that cut meshes, or the CPU, write them; those
+// that draw read them.
 
 struct Vertex {
     // Position relative to the scene's middle, and uv.x.
@@ -8,14 +8,14 @@ struct Vertex {
     normal_v: vec4<f32>,
     // Unit tangent, and the sign of the bitangent.
     tangent: vec4<f32>,
-    // With relief, how slopes of the map lie on the surface, by columns.
+    // Matrix that takes slopes of the map to the surface, by columns, on a mesh with relief.
     stretch: vec4<f32>,
 }
 
 struct Triangle {
     // Unit normal, and the object.
     face: vec4<f32>,
-    // How u and v change with the place; the first has a 1 on a mesh with relief.
+    // Gradients of u and v over places; the first has a 1 on a mesh with relief.
     grad_u: vec4<f32>,
     grad_v: vec4<f32>,
 }

@@ -1,4 +1,4 @@
-//! What pictures have in common that the `image` crate decodes.
+//! Common part of the formats that the `image` crate decodes.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use ndfmap_core::grid::Size;
 use crate::image::check_size;
 use crate::{Image, MapError, Samples};
 
-/// How many bytes a file has, and how many texels one of them stands for at most.
+/// Bytes of a file, and the most texels that one byte can stand for.
 pub(super) struct Capacity {
     pub(super) bytes: usize,
     pub(super) texels_per_byte: usize,

@@ -159,14 +159,14 @@ fn read_ndf(path: &Path, bytes: &[u8]) -> Result<Option<NdfMap>, MapError> {
     read_native(path, header, &layers).map(Some)
 }
 
-/// OpenImageIO's `swrap,twrap`; black and mirror are read as clamp, which is what lies nearest.
+/// OpenImageIO's `swrap,twrap`; black and mirror are read as clamp, the nearest that we have.
 fn spell_oiio_wraps(text: &str) -> [String; 2] {
     let mut words = text.split(',');
     let mut wrap = || if words.next() == Some("periodic") { "repeat".to_owned() } else { "clamp".to_owned() };
     [wrap(), wrap()]
 }
 
-/// A channel's values on a level, of the length that the level's size asks for.
+/// Values of a channel on a level, as many as the level has texels.
 fn level_values(
     path: &Path,
     channel: &AnyChannel<Levels<FlatSamples>>,
@@ -188,7 +188,7 @@ fn level_values(
     })
 }
 
-/// Half when every channel is.
+/// Precision of all channels: half when every channel is.
 fn precision_of(layers: &[AnyLayer]) -> Precision {
     let half = |samples: &Levels<FlatSamples>| match samples {
         Levels::Singular(FlatSamples::F16(_)) => true,
@@ -222,7 +222,7 @@ fn read_native(path: &Path, header: Header, layers: &[AnyLayer]) -> Result<NdfMa
     NdfMap::assemble(path, header, precision, levels)
 }
 
-/// What turns our height and slopes into bumpslopes' units: b0 = h × `height`, b1 = x × `s`, b2 = y × `t`.
+/// Factors from our height and slopes to bumpslopes' units: b0 = h × `height`, b1 = x × `s`, b2 = y × `t`.
 struct BumpslopeUnits {
     height: f32,
     s: f32,
@@ -264,7 +264,7 @@ fn read_bumpslopes(
     let header = match header {
         Some(header) => header,
         None => {
-            // OpenImageIO writes -1 for the height of what was a normal map.
+            // OpenImageIO writes -1 for the height where the source was a normal map.
             let heights = level_values(path, six[0], 0, size)?;
             let kind =
                 if heights.iter().all(|h| *h == -1.0) { SourceKind::Normal } else { SourceKind::Height };
@@ -420,7 +420,7 @@ fn write_layers(
             } else {
                 LayerAttributes::named(name.as_str())
             };
-            // So that OpenImageIO's texture system takes the file for a texture and wraps it as it was baked.
+            // OpenImageIO's texture system then takes the file for a texture and wraps it as it was baked.
             own.wrap_mode_name = Some(Text::from(wraps.as_str()));
             own.other.insert(Text::from("textureformat"), text("Plain Texture"));
             Layer::new(size, own, encoding, channels)

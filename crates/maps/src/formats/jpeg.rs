@@ -20,7 +20,7 @@ pub(super) const FORMAT: Format = Format {
 };
 
 fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
-    // The decoder fills what is missing with grey; a map must not come out half invented. A sound file
+    // The decoder fills missing parts with grey, and a map must not come out half invented. A sound file
     // ends in the end-of-image marker, perhaps padded.
     let end = bytes.iter().rposition(|b| *b != 0).map_or(0, |last| last + 1);
     if !bytes[..end].ends_with(&[0xFF, 0xD9]) {

@@ -1,8 +1,9 @@
 //! KTX2, the native container: a 2-D array texture, one array layer per RGBA layer, full mip chain.
 //!
-//! Written over the `ktx2` crate's serialisers, level 0 in bands while it is being baked, so a map need never
-//! be in memory whole. Read by hand from its header, level index and key/value data: the crate's `Reader`
-//! panics on a hostile data format descriptor, which we do not need. `docs/formats.md` has the layout.
+//! The writer uses the `ktx2` crate's serialisers and writes level 0 in bands while it is being baked, so a
+//! map need never be in memory whole. The reader takes header, level index and key/value data by hand: the
+//! crate's `Reader` panics on a hostile data format descriptor, which we do not need. `docs/formats.md` has
+//! the layout.
 
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -41,7 +42,7 @@ fn vk_format(precision: Precision) -> VkFormat {
     }
 }
 
-/// Key and value as KTX2 stores them: length, key, NUL, value, NUL, padding to 4.
+/// Key and value in KTX2's form: length, key, NUL, value, NUL, padding to 4.
 fn key_value(key: &str, value: &str) -> Vec<u8> {
     let length = key.len() + value.len() + 2;
     let mut entry = u32::try_from(length).unwrap_or(u32::MAX).to_le_bytes().to_vec();
@@ -53,7 +54,7 @@ fn key_value(key: &str, value: &str) -> Vec<u8> {
     entry
 }
 
-/// All of a file but its levels, and where those lie.
+/// Front of a file: all but its levels, and the places of those.
 struct Front {
     bytes: Vec<u8>,
     /// First byte of each level.
@@ -63,7 +64,7 @@ struct Front {
 }
 
 impl Front {
-    /// For levels of these stored lengths, finest first.
+    /// Front for levels of these stored lengths, finest first.
     fn new(
         path: &Path,
         header: &Header,
@@ -152,7 +153,8 @@ fn write_ndf(path: &Path, map: &NdfMap, options: &WriteOptions) -> Result<u64, M
 
 /// Writes a map with Zstandard supercompression, at a level from 1 (fast) to 22; returns the file's length.
 ///
-/// Every compression level's bytes are the same for any number of threads: the library cuts its jobs by size.
+/// At every compression level the bytes are the same for any number of threads: the library cuts its jobs by
+/// size.
 fn write_compressed(path: &Path, map: &NdfMap, level: i32) -> Result<u64, MapError> {
     let io = |e| MapError::io(path, e);
     let p = &map.pyramid;
@@ -228,7 +230,7 @@ impl LevelSink for Ktx2Sink {
     }
 }
 
-/// The most that a byte of Zstandard can stand for: a block of 128 KiB of one value takes four.
+/// Most bytes that a byte of Zstandard can stand for: a block of 128 KiB of one value takes four.
 const MOST_PER_BYTE: u64 = 32_768;
 
 /// Decompresses a level that must be `expected` bytes long; memory grows only as bytes come out.

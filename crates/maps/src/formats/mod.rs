@@ -1,6 +1,6 @@
 //! File formats: one file each, and the table of them.
 //!
-//! What a file is comes from its first bytes, not from its name; only TGA, which has none, goes by name.
+//! The first bytes of a file tell its format, not its name; only TGA has no such bytes and goes by name.
 //! Every reader gets the whole file in memory (so nothing is larger than the file itself allows) and
 //! checks sizes before it allocates for them.
 
@@ -34,7 +34,7 @@ pub type WriteNdf = fn(&Path, &NdfMap, &WriteOptions) -> Result<u64, MapError>;
 /// Opens a file that a map is baked into, row by row.
 pub type OpenSink = fn(&Path, &Header, Layout) -> Result<Box<dyn NdfSink>, MapError>;
 
-/// File that a map is being baked into. Dropped before it is finished, nothing of it is left.
+/// File that a map is being baked into. Nothing of it is left when it is dropped unfinished.
 pub trait NdfSink: LevelSink<Error = MapError> {
     /// Gives the file its name; returns its length in bytes.
     ///
@@ -55,14 +55,14 @@ pub enum ChannelLayout {
 
 words!(ChannelLayout { Native => "native", Bumpslopes => "bumpslopes" });
 
-/// How a map is written, where there is a choice; the default is the plain form of every format.
+/// Choices in writing a map; the default is the plain form of every format.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WriteOptions {
-    /// Zstandard, at a level from 1 (fast) to 22, for KTX2; an OpenEXR is compressed as it is.
+    /// Level of Zstandard, from 1 (fast) to 22, for KTX2; an OpenEXR has compression of its own.
     pub zstd: Option<i32>,
     /// Channels of an OpenEXR.
     pub channels: ChannelLayout,
-    /// Precision of bumpslopes, whose units differ from the map's; the map's own where there is none.
+    /// Precision of bumpslopes, whose units differ from the map's; `None` for the map's own.
     pub precision: Option<Precision>,
 }
 
@@ -72,7 +72,7 @@ pub struct Format {
     pub name: &'static str,
     /// Extensions, lower case; the first is the usual one.
     pub extensions: &'static [&'static str],
-    /// First bytes that give it away; empty for a format that has none.
+    /// Signatures, the first bytes of such files; empty for a format without any.
     pub magic: &'static [&'static [u8]],
     /// Reads a picture.
     pub read_image: Option<ReadImage>,
@@ -97,7 +97,7 @@ impl Format {
     };
 }
 
-/// Every format there is, of those that the crate was built with.
+/// Every format that the crate was built with.
 pub static TABLE: &[Format] = &[
     png::FORMAT,
     jpeg::FORMAT,
@@ -109,7 +109,7 @@ pub static TABLE: &[Format] = &[
     tga::FORMAT,
 ];
 
-/// The format of a file, by its first bytes, else by its name.
+/// Format of a file, by its first bytes, else by its name.
 ///
 /// # Errors
 /// [`MapError`] for a file of no known format.
@@ -131,10 +131,10 @@ pub fn detect(path: &Path, bytes: &[u8]) -> Result<&'static Format, MapError> {
     Err(MapError::invalid(path, reason))
 }
 
-/// The format that a map is written in, by the file's name.
+/// Format to write a map in, by the file's name.
 ///
 /// # Errors
-/// [`MapError`] for a name that asks for no format that maps are written in.
+/// [`MapError`] for a name of no format that maps are written in.
 pub fn to_write(path: &Path) -> Result<&'static Format, MapError> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let written = || TABLE.iter().filter(|f| f.write_ndf.is_some());
@@ -144,7 +144,7 @@ pub fn to_write(path: &Path) -> Result<&'static Format, MapError> {
     })
 }
 
-/// The bytes of a file; a folder or a missing file is an error that says so.
+/// Bytes of a file; a folder or a missing file is an error that says so.
 ///
 /// # Errors
 /// [`MapError`] from the operating system.

@@ -23,7 +23,7 @@ pub(super) const FORMAT: Format = Format {
     ..Format::READ_ONLY
 };
 
-/// GDAL_NODATA: the value, as text, of posts that were not measured.
+/// Tag GDAL_NODATA: value, as text, of posts that were not measured.
 const NO_DATA: Tag = Tag::Unknown(42113);
 
 fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
@@ -84,7 +84,7 @@ fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
     Ok(image)
 }
 
-/// Gives holes the lowest value that is none; returns how many there were.
+/// Fills holes with the lowest measured value; returns the number of holes.
 fn fill<T: Copy + PartialOrd>(values: &mut [T], is_hole: impl Fn(&T) -> bool) -> usize {
     let lower = |a: T, b: T| if b < a { b } else { a };
     let Some(lowest) = values.iter().copied().filter(|v| !is_hole(v)).reduce(lower) else { return 0 };

@@ -1,9 +1,9 @@
 //! glTF 2.0 by the `gltf` crate: meshes in the pose of the file, and metallic-roughness materials.
 //!
-//! Read: positions, normals, tangents, the normal texture's coordinates (with `KHR_texture_transform` and
+//! It reads positions, normals, tangents, the normal texture's coordinates (with `KHR_texture_transform` and
 //! scale), base colour, metalness and roughness, factors and textures. Colours and roughness are averaged
-//! over the texels of the normal map. Not read: animation, skins, morphs, occlusion, emission, alpha, cameras
-//! and lights.
+//! over the texels of the normal map. It does not read animation, skins, morphs, occlusion, emission, alpha,
+//! cameras and lights.
 
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -28,7 +28,8 @@ use crate::{Image, MapError, SourceKind};
 
 pub(super) const FORMAT: ModelFormat = ModelFormat { name: "glTF", extensions: &["gltf", "glb"], read };
 
-/// Smoothest surface that is told from a mirror: narrower highlights fall between the rays of any truth.
+/// Least roughness, below which surfaces count as mirrors: narrower highlights fall between the rays of any
+/// truth.
 const LEAST_ROUGHNESS: f64 = 0.05;
 
 /// Deepest tree of nodes.
@@ -51,7 +52,7 @@ fn read(path: &Path, bytes: &[u8], warnings: &mut Vec<String>) -> Result<Parts, 
     for material in document.materials() {
         materials.push(files.material(&material, warnings)?);
     }
-    // What has no material gets glTF's default one, at the end.
+    // Primitives without a material get glTF's default one, at the end.
     materials.push(super::plain());
     let mut walk = Walk {
         files: &files,
@@ -77,7 +78,7 @@ fn read(path: &Path, bytes: &[u8], warnings: &mut Vec<String>) -> Result<Parts, 
     Ok(Parts { meshes: walk.meshes, materials })
 }
 
-/// The document's files.
+/// Files of the document.
 struct Files<'a> {
     path: &'a Path,
     buffers: Vec<Cow<'a, [u8]>>,
@@ -99,7 +100,7 @@ fn resource(path: &Path, uri: &str) -> Result<(PathBuf, Vec<u8>), MapError> {
         return Err(MapError::unsupported(path, format!("names `{uri}`, which is not a file beside it")));
     }
     let file = path.with_file_name("").join(name);
-    // Not a device or a pipe, which would never end.
+    // Refuses a device or a pipe, which would never end.
     if file.exists() && !file.is_file() {
         return Err(MapError::invalid(&file, "is no file"));
     }
@@ -168,7 +169,7 @@ impl Files<'_> {
                 (self.path.to_owned(), bytes.to_vec())
             }
         };
-        // A picture inside the file has no name, and is told by its first bytes.
+        // A picture inside the file has no name; its first bytes tell its format.
         let image = read_image(&file, &bytes)?;
         Ok((file, image))
     }
@@ -266,7 +267,7 @@ impl Files<'_> {
     }
 }
 
-/// The mean over a map, for when the map is taken away.
+/// Means over a map, for materials whose map is taken away.
 fn mean_params(diffuse_roughness: &Grid<[f32; 4]>, specular: &Grid<[f32; 4]>) -> SurfaceParams {
     let mean = |map: &Grid<[f32; 4]>, c: usize| {
         map.texels().iter().map(|t| f64::from(t[c])).sum::<f64>() / map.texels().len() as f64
@@ -278,7 +279,7 @@ fn mean_params(diffuse_roughness: &Grid<[f32; 4]>, specular: &Grid<[f32; 4]>) ->
     }
 }
 
-/// A material's constant factors.
+/// Constant factors of a material.
 struct MaterialFactors {
     base: [f32; 4],
     metallic: f32,
@@ -286,7 +287,7 @@ struct MaterialFactors {
 }
 
 impl MaterialFactors {
-    /// The finish under texture values, and its roughness (glTF 2.0, appendix B).
+    /// Surface parameters under texture values, and the roughness (glTF 2.0, appendix B).
     fn params(&self, base: [f32; 4], metal_rough: [f32; 4]) -> (SurfaceParams, f64) {
         let base = DVec3::from([0, 1, 2].map(|i| f64::from(self.base[i] * base[i])));
         let metal = f64::from(self.metallic * metal_rough[2]).clamp(0.0, 1.0);
@@ -303,22 +304,22 @@ impl MaterialFactors {
 }
 
 fn wraps(sampler: &gltf::texture::Sampler<'_>) -> Wraps {
-    // What is mirrored is taken as repeated: nobody's normal maps are meant to be mirrored.
+    // Mirrored maps are read as repeated: no normal map is meant to be mirrored.
     let wrap =
         |mode| if mode == gltf::texture::WrappingMode::ClampToEdge { Wrap::Clamp } else { Wrap::Repeat };
     Wraps { x: wrap(sampler.wrap_s()), y: wrap(sampler.wrap_t()) }
 }
 
-/// Goes through nodes and collects their meshes.
+/// Walk over the nodes that collects their meshes.
 struct Walk<'a> {
     files: &'a Files<'a>,
     plain: usize,
     meshes: Vec<(RawMesh, usize)>,
-    /// Nodes that have been gone through: a tree has each once.
+    /// Nodes visited: a tree has each once.
     seen: HashSet<usize>,
     /// Vertices and indices so far.
     elements: usize,
-    /// Primitives that are no triangles.
+    /// Number of primitives left out, which are not triangles.
     left_out: usize,
 }
 
@@ -402,7 +403,7 @@ impl Walk<'_> {
             .read_normals()
             .map(|n| n.map(|n| normal_matrix * Vec3::from(n)).collect())
             .unwrap_or_default();
-        // Tangents without normals belong to normals that are not there, and are made anew with them.
+        // Tangents without normals belong to normals that are missing; both are made anew.
         let tangents = reader.read_tangents().filter(|_| !normals.is_empty());
         Ok(RawMesh {
             positions,

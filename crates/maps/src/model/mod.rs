@@ -1,8 +1,8 @@
 //! Models: meshes and materials from glTF, OBJ and PLY files, as scenes.
 //!
-//! A parser only fills in a raw mesh; what a file leaves out is made here, the same way for all: normals
-//! (area-weighted), map coordinates (`unwrap.rs`), tangents (MikkTSpace), and a camera and two lights that
-//! suit the model's size.
+//! A parser only fills in a raw mesh. This module makes what the file leaves out, the same way for all
+//! formats: normals (area-weighted), map coordinates (`unwrap.rs`), tangents (MikkTSpace), and a camera and
+//! two lights that suit the model's size.
 
 #[cfg(feature = "gltf")]
 mod gltf;
@@ -39,7 +39,7 @@ pub struct ModelFormat {
     read: ReadModel,
 }
 
-/// Every model format there is, of those that the crate was built with.
+/// Every model format that the crate was built with.
 pub static TABLE: &[ModelFormat] = &[
     #[cfg(feature = "gltf")]
     gltf::FORMAT,
@@ -49,20 +49,20 @@ pub static TABLE: &[ModelFormat] = &[
     ply::FORMAT,
 ];
 
-/// How to take a model.
+/// Options for reading a model.
 pub struct ModelOptions {
     /// A map for the first material, in place of its own; the time is ignored.
     pub staging: SceneOptions,
 }
 
-/// Meshes and what they are made of.
+/// Meshes and their materials.
 struct Parts {
     meshes: Vec<(RawMesh, usize)>,
-    /// None: one plain material, index 0.
+    /// Materials; an empty list stands for one plain material, index 0.
     materials: Vec<Material>,
 }
 
-/// A mesh as read; empty lists are what the file leaves out.
+/// Mesh as read; a list is empty where the file leaves it out.
 #[derive(Default)]
 struct RawMesh {
     positions: Vec<Vec3>,
@@ -72,7 +72,7 @@ struct RawMesh {
     triangles: Vec<[u32; 3]>,
 }
 
-/// Vertices, and triangles, that a mesh may have.
+/// Most vertices, and most triangles, of a mesh.
 const MAX_ELEMENTS: usize = 1 << 26;
 
 fn format_of(path: &Path) -> Option<&'static ModelFormat> {
@@ -86,7 +86,7 @@ pub fn is_model(path: &Path) -> bool {
     format_of(path).is_some()
 }
 
-/// Reads a model as a scene, with what is odd about it.
+/// Reads a model as a scene; returns it with warnings.
 ///
 /// # Errors
 /// [`MapError`] when it, or a file that it names, cannot be read.
@@ -94,7 +94,7 @@ pub fn read_model(path: &Path, options: &ModelOptions) -> Result<(Scene, Vec<Str
     model_of_bytes(path, &read_file(path)?, options)
 }
 
-/// Takes a whole file in memory as a model; its name says of which format, and where the files are that it
+/// Reads a model from a whole file in memory. The path tells its format, and the folder of the files that it
 /// names.
 ///
 /// # Errors
@@ -109,7 +109,7 @@ pub fn model_of_bytes(
         MapError::unsupported(path, format!("is no model; models are {}", names.join(", ")))
     })?;
     let mut warnings = Vec::new();
-    // What decoders assert about hostile files is caught: it is the file that is wrong.
+    // Failed assertions of a decoder are caught: the fault is the file's, which may be hostile.
     let read = std::panic::AssertUnwindSafe(|| (format.read)(path, bytes, &mut warnings));
     let damaged = || {
         MapError::invalid(path, format!("is damaged in a way that the {} reader cannot handle", format.name))
@@ -131,7 +131,7 @@ fn scene_of(
     if parts.materials.is_empty() {
         parts.materials.push(plain());
     }
-    // The first material is that of the first mesh, for whoever changes it later.
+    // The first mesh's material becomes the first, for whoever changes the first material later.
     let first = parts.meshes[0].1;
     parts.materials.swap(0, first);
     for (_, material) in &mut parts.meshes {
@@ -180,7 +180,7 @@ fn flat(size: Size) -> Arc<dyn Surface> {
     Arc::new(NormalGrid { normals: Grid::from_fn(size, |_, _| Vec3::Z), wraps: Wraps::default() })
 }
 
-/// What a file without materials is made of.
+/// Material of a file without materials.
 fn plain() -> Material {
     Material {
         name: "plain".to_owned(),
@@ -203,7 +203,7 @@ fn microfacets(alpha: f64) -> Brdf {
 }
 
 impl RawMesh {
-    /// Checks the mesh and makes what is missing.
+    /// Checks the mesh and makes its missing parts.
     fn finish(mut self, path: &Path, warnings: &mut Vec<String>) -> Result<Mesh, MapError> {
         let count = self.positions.len();
         if count.max(self.triangles.len()) > MAX_ELEMENTS {
@@ -231,7 +231,7 @@ impl RawMesh {
             }
         }
         if self.normals.is_empty() {
-            // Made unit vectors below, with those that files have.
+            // The loop below makes them unit vectors, as it does those of files.
             self.normals = area_normals(&self.positions, &self.triangles);
         }
         if self.uvs.is_empty() {
@@ -294,7 +294,7 @@ impl Geometry for Corners<'_> {
         self.mesh.normals[self.index(face, corner)].into()
     }
 
-    /// With v up the picture, so that the bitangent points where green does.
+    /// Map coordinates with v up the picture, so that the bitangent points where green does.
     fn tex_coord(&self, face: usize, corner: usize) -> [f32; 2] {
         let uv = self.mesh.uvs[self.index(face, corner)];
         [uv.x, 1.0 - uv.y]
@@ -310,7 +310,7 @@ impl Geometry for Corners<'_> {
 /// Tangents by MikkTSpace; a vertex becomes several where its triangles disagree.
 fn with_tangents(mesh: &RawMesh) -> Mesh {
     let mut corners = Corners { mesh, tangents: vec![Vec4::ZERO; 3 * mesh.triangles.len()] };
-    // It fails only for want of memory or of triangles; then tangents are made from the normals alone.
+    // MikkTSpace fails only for want of memory or of triangles; then tangents come from the normals alone.
     let made = generate_tangents(&mut corners).is_ok();
     let mut known = std::collections::HashMap::new();
     let mut out = Mesh::default();

@@ -4,10 +4,10 @@ use glam::{Vec2, Vec3};
 
 use super::RawMesh;
 
-/// How often the map repeats along the longest side of the mesh.
+/// Repeats of the map along the longest side of the mesh.
 const TILES: f32 = 4.0;
 
-/// The mesh with map coordinates, its vertices no longer shared. Seams run where the axis changes.
+/// Mesh with map coordinates, its vertices no longer shared. Seams run where the axis changes.
 pub(super) fn along_axes(mesh: &RawMesh) -> RawMesh {
     let low = mesh.positions.iter().copied().fold(Vec3::INFINITY, Vec3::min);
     let high = mesh.positions.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);

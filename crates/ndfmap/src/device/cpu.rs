@@ -38,7 +38,7 @@ impl Engine for Cpu {
 
     fn set(&self, scene: &Scene, size: Size) -> Result<Geometry, Error> {
         if let Some(environment) = &scene.environment {
-            // Made once, and no frame's time.
+            // Tables that are made once count as no frame's time.
             for material in &scene.materials {
                 environment.filtered.make(environment.technique, material.brdf.lobe.microfacets());
             }

@@ -13,11 +13,11 @@ use ndfmap_scene::{Effort, Material, Scene, TruePicture};
 use super::{DeviceReport, Engine, RenderedPicture, TrueGeometry, View};
 use crate::Error;
 
-/// A GPU, and how it draws.
+/// GPU with its options for drawing.
 pub(crate) struct Gpu {
     device: Device,
     renderer: Renderer,
-    /// The device's own sampler filters, with so many taps, in place of ours.
+    /// Taps of the device's own sampler, which then filters in place of ours.
     sampler: Option<u16>,
     outlines: Antialiasing,
 }
@@ -69,7 +69,7 @@ impl Engine for Gpu {
         observer: &dyn Observer,
     ) -> Result<TruePicture, Error> {
         if view.scene.is_displaced() || view.scene.environment.is_some() {
-            // Facets of relief are rays' business, and so is light that is drawn by chance.
+            // Facets of relief, and light that is drawn by chance, need rays.
             let geometry = TrueGeometry::new(view.scene, observer);
             return Ok(geometry.truth(view.scene).render(&view.camera, view.size, effort, observer)?);
         }
@@ -92,8 +92,8 @@ impl Engine for Gpu {
         let frame = Frame { view: Self::shown(view), maps, lookups };
         self.renderer.draw(&canvas, &frame)?;
         let picture = canvas.read()?;
-        // The picture's own passes made pipelines and read the result back: a frame like the next one tells
-        // what it takes.
+        // The picture's own passes made pipelines and read the result back: a second frame like it takes the
+        // true time.
         let milliseconds = self.renderer.time(&canvas, &frame)?;
         Ok(RenderedPicture { picture, milliseconds })
     }

@@ -1,4 +1,5 @@
-//! What renders: the processor, or a GPU. The same maps and scenes, the same pictures; see `docs/gpu.md`.
+//! Devices that render: the processor, or a GPU. Both make the same pictures of the same maps and scenes; see
+//! `docs/gpu.md`.
 
 mod cpu;
 #[cfg(feature = "gpu")]
@@ -21,7 +22,7 @@ use serde::Serialize;
 
 use crate::Error;
 
-/// What rendered.
+/// Description of the device that rendered.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "device", rename_all = "lowercase")]
 #[non_exhaustive]
@@ -30,18 +31,18 @@ pub enum DeviceReport {
     Cpu,
     /// A GPU.
     Gpu {
-        /// Its name, and its interface to us.
+        /// Name of the adapter, and its interface to us.
         adapter: String,
-        /// Whose clock frames are timed by: `device`, or `wall`.
+        /// Clock that times frames: `device`, or `wall`.
         clock: &'static str,
-        /// Taps of the device's own sampler, where that filters.
+        /// Taps of the device's own sampler, where it filters.
         sampler: Option<u16>,
-        /// How outlines are smoothed: `parts`, or `multisampled`.
+        /// Antialiasing of outlines: `parts`, or `multisampled`.
         outlines: &'static str,
     },
 }
 
-/// A scene that is set up, seen by a camera.
+/// Scene that is set up, seen by a camera.
 pub(crate) struct View<'a, S> {
     pub(crate) scene: &'a Scene,
     pub(crate) set: &'a S,
@@ -49,13 +50,13 @@ pub(crate) struct View<'a, S> {
     pub(crate) size: Size,
 }
 
-/// A picture through baked maps, and what a frame like it takes.
+/// Picture through baked maps, and the time of a frame like it.
 pub(crate) struct RenderedPicture {
     pub(crate) picture: Picture,
     pub(crate) milliseconds: f64,
 }
 
-/// What the CPU renderer's truth hits, of a scene with relief or without.
+/// Geometry for the CPU renderer's truth, of a scene with relief or without.
 pub(crate) struct TrueGeometry {
     plain: Geometry,
     displacement: Option<DisplacedMeshes>,
@@ -80,15 +81,15 @@ impl TrueGeometry {
     }
 }
 
-/// What renders.
+/// Device that renders.
 pub(crate) trait Engine {
-    /// Maps baked for it.
+    /// Maps baked for the device.
     type Maps;
 
-    /// A scene's triangles, and what else it keeps of a scene.
+    /// Triangles of a scene, and all else that the device keeps of a scene.
     type Set;
 
-    /// What it is.
+    /// Describes the device.
     fn describe(&self) -> DeviceReport;
 
     /// Bakes a scene's maps.
@@ -100,7 +101,7 @@ pub(crate) trait Engine {
         observer: &dyn Observer,
     ) -> Result<Self::Maps, Error>;
 
-    /// Sets a scene up for pictures of this size from where its camera is, or less than a pixel away.
+    /// Sets a scene up for pictures of this size by its camera, or by one less than a pixel away.
     fn set(&self, scene: &Scene, size: Size) -> Result<Self::Set, Error>;
 
     /// Renders by brute force.

@@ -1,4 +1,4 @@
-//! What a filter makes of lobes at a corner between four texels, as in Tan et al. 2005, figure 5: the
+//! Lobes that a filter has mixed at a corner between four texels, as in Tan et al. 2005, figure 5: the
 //! histogram of the normals, lobes that were not aligned, aligned ones, and the reference path that shades
 //! each texel by itself.
 
@@ -17,13 +17,13 @@ use super::canvas::{Canvas, LETTER, LINE};
 use super::disks::{PEN, SCALE, SIDE, busiest, plot};
 use crate::compare::{Comparison, Row, Subject};
 
-/// The level drawn, where there is one.
+/// Level drawn, where the map has it.
 const LEVEL: usize = 4;
 
 /// Titles of the columns.
 const COLUMNS: [&str; 4] = ["histogram", "unaligned", "as baked", "each texel shaded"];
 
-/// Draws a row for every mixture that was compared; `None` when there is none, or no corner to look at.
+/// Draws a row for every mixture that was compared; `None` without a mixture, or without a corner to look at.
 pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Result<Option<Canvas>, Cancelled> {
     let rows: Vec<Mixture<'_>> = comparison.rows.iter().filter_map(mixture).collect();
     let sizes = &comparison.sizes;
@@ -72,7 +72,7 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Result<Opt
     Ok(Some(canvas))
 }
 
-/// A mixture's row, its method, and the same method unaligned.
+/// Mixture in the comparison: its row, its method, and the same method unaligned.
 struct Mixture<'a> {
     row: &'a Row,
     method: AnyMethod,

@@ -30,7 +30,7 @@ impl Canvas {
         Self { width, height, pixels: vec![PAPER; width * height] }
     }
 
-    /// Sets a pixel; outside is ignored.
+    /// Sets a pixel; ignores pixels outside the picture.
     pub(super) fn set(&mut self, x: usize, y: usize, colour: Rgb) {
         if x < self.width && y < self.height {
             self.pixels[y * self.width + x] = colour;
@@ -56,7 +56,7 @@ impl Canvas {
     }
 }
 
-/// Dark to light in one hue order: readable in grey and by the colour-blind.
+/// Colour of a heat map, from dark to light in one order of hues: readable in grey and by the colour-blind.
 pub(super) fn heat(t: f64) -> Rgb {
     const STOPS: [Rgb; 5] = [INK, [60, 40, 120], [190, 55, 90], [250, 150, 60], PAPER];
     let at = t * (STOPS.len() - 1) as f64;

@@ -1,4 +1,4 @@
-//! What the normals under one texel do, drawn on the unit disk: the truth beside every method.
+//! Distribution of the normals under one texel, drawn on the unit disk: the truth beside every method.
 
 use glam::Vec3;
 use ndfmap_core::bake::Bake;
@@ -17,10 +17,10 @@ use ndfmap_core::brdf::AnyLobe;
 pub(super) const SIDE: usize = 72;
 pub(super) const SCALE: usize = 2;
 
-/// The normals are drawn as a sharp lobe would show them, so that all methods draw the same thing.
+/// Sharp lobe through which the normals are drawn, so that all methods draw the same thing.
 pub(super) const PEN: &str = "blinn-phong:200";
 
-/// Texels drawn: at these levels, the one whose normals stray most.
+/// Levels drawn; at each, the texel whose normals stray most.
 const LEVELS: [usize; 3] = [3, 5, 7];
 
 /// Draws the disks: a row a level, a column a method.
@@ -46,7 +46,7 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Result<Can
         canvas.text(8, y + 8, &format!("level {level}"));
         canvas.text(8, y + 8 + LINE, &format!("({},{})", texel.0, texel.1));
         let true_lobe = truth.texel(size, texel.0, texel.1);
-        // Square root spreads the dark end; the truth's peak is white, and what exceeds it is too.
+        // The square root spreads the dark end; the truth's peak is white, and so are higher values.
         let peak = true_lobe.iter().copied().fold(1e-12, f64::max);
         plot(&mut canvas, &lattice, (label, y), &true_lobe, peak);
         for (column, row) in comparison.rows.iter().enumerate() {
@@ -61,7 +61,7 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Result<Can
     Ok(canvas)
 }
 
-/// The texel of a level whose mean normal is shortest.
+/// Texel of a level whose mean normal is shortest.
 pub(super) fn busiest(subject: &Subject<'_>, size: Size) -> Result<(usize, usize), Cancelled> {
     let bake = Bake::new(subject.surface, &Toksvig).precision(Precision::Single);
     let (pyramid, _) = bake.to_pyramid()?;
@@ -81,7 +81,7 @@ pub(super) fn plot(
     let pixel = |c: f64| ((c + 1.0) / 2.0 * SIDE as f64) as usize;
     for (w, value) in lattice.directions.iter().zip(lobe) {
         let colour = heat((value / peak).clamp(0.0, 1.0).sqrt());
-        // y is up on the disk, down on the picture.
+        // y runs up the disk, and down the picture.
         let (i, j) = (pixel(w.x), SIDE - 1 - pixel(w.y));
         for dy in 0..SCALE {
             for dx in 0..SCALE {

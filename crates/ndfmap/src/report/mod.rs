@@ -19,17 +19,17 @@ use crate::render::RenderReport;
 
 pub use pictures::{SheetPlan, contact_sheet};
 
-/// What a report is drawn from.
+/// Contents of a report, to be drawn.
 pub struct Pages<'a> {
-    /// What was compared.
+    /// Subject of the comparison.
     pub subject: &'a Subject<'a>,
-    /// What came of it.
+    /// Results of the comparison.
     pub comparison: &'a Comparison,
-    /// Pictures of a scene with the same methods, where there are any.
+    /// Pictures of a scene with the same methods, if any.
     pub pictures: Option<&'a RenderReport>,
-    /// What the map was read from.
+    /// Source that the map was read from.
     pub source: &'a Source,
-    /// What its reader warned of.
+    /// Warnings of its reader.
     pub warnings: &'a [String],
 }
 
@@ -48,8 +48,8 @@ pub struct ReportFile {
 pub fn draw(pages: &Pages<'_>) -> Result<Vec<ReportFile>, Error> {
     let sheet = sheet::draw(pages.subject, pages.comparison).to_png()?;
     let disks = disks::draw(pages.subject, pages.comparison)?.to_png()?;
-    // It bakes every mixture once more, unaligned: seconds that only those who ask about filtering should
-    // wait for.
+    // This figure bakes every mixture once more, unaligned: only those who ask about filtering should wait
+    // for it.
     let asked = pages.subject.filtering;
     let between = if asked { between::draw(pages.subject, pages.comparison)? } else { None };
     let between = between.map(|canvas| canvas.to_png()).transpose()?;
@@ -76,7 +76,7 @@ pub fn draw(pages: &Pages<'_>) -> Result<Vec<ReportFile>, Error> {
     Ok(files)
 }
 
-/// What a page shows, drawn.
+/// Figures of a page, drawn.
 struct Figures<'a> {
     sheet: &'a [u8],
     disks: &'a [u8],

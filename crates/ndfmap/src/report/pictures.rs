@@ -12,7 +12,7 @@ use crate::render::{PictureErrors, RenderReport};
 /// Difference of display values, over sqrt 3, that is drawn brightest.
 const BRIGHTEST: f32 = 0.5;
 
-/// Where things are on a contact sheet.
+/// Layout of a contact sheet.
 pub struct SheetPlan {
     picture: Size,
     has_truth: bool,
@@ -20,12 +20,12 @@ pub struct SheetPlan {
     frames: usize,
 }
 
-/// Between pictures, and above the first.
+/// Gap between pictures, and above the first.
 const GAP: usize = 8;
 const TOP: usize = 4 * LINE;
 
 impl SheetPlan {
-    /// A sheet for this many methods and frames of pictures of a size, perhaps with the truth.
+    /// Plans a sheet for this many methods and frames of pictures of a size, perhaps with the truth.
     #[must_use]
     pub fn new(picture: Size, has_truth: bool, methods: usize, frames: usize) -> Self {
         Self { picture, has_truth, columns: methods + usize::from(has_truth), frames }
@@ -41,7 +41,7 @@ impl SheetPlan {
         self.picture.width.max(24 * LETTER) + GAP
     }
 
-    /// A frame's pictures, their differences where there is a truth, and lines of text.
+    /// Height of a frame: its pictures, their differences where there is a truth, and lines of text.
     fn step_y(&self) -> usize {
         (if self.has_truth { 2 } else { 1 }) * (self.picture.height + GAP) + 4 * LINE
     }
@@ -55,7 +55,8 @@ impl SheetPlan {
 pub fn contact_sheet(report: &RenderReport, title: &str) -> Result<Vec<u8>, Error> {
     let Some(first) = report.frames.first() else { return Canvas::new(1, 1).to_png() };
     let has_truth = first.truth.is_some();
-    let size = first.pictures[0].size();
+    let kept = first.pictures.first();
+    let size = kept.ok_or_else(|| Error::Request("the pictures were not kept".to_owned()))?.size();
     let plan = SheetPlan::new(size, has_truth, report.methods.len(), report.frames.len());
     let Size { width, height } = plan.size();
     let mut canvas = Canvas::new(width.max((title.len() + 2) * LETTER), height);

@@ -1,4 +1,4 @@
-//! Error by level for every method, as SVG.
+//! Plot of the error by level for every method, as SVG.
 
 use plotters::prelude::{
     BLACK, ChartBuilder, Circle, Color, EmptyElement, IntoDrawingArea, IntoLogRange, LineSeries, PathElement,
@@ -10,7 +10,7 @@ use plotters::style::ShapeStyle;
 use crate::Error;
 use crate::compare::Comparison;
 
-/// Okabe and Ito's colours, said apart by the colour-blind too; after eight they start again.
+/// Okabe and Ito's colours, which the colour-blind can tell apart; after eight they start again.
 const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 0, 0),
     RGBColor(230, 159, 0),
@@ -22,10 +22,10 @@ const COLOURS: [RGBColor; 8] = [
     RGBColor(150, 150, 150),
 ];
 
-/// Errors below this are drawn on the floor: nothing to see there but rounding.
+/// Floor of the plot: smaller errors are drawn on it, for they are only rounding.
 const FLOOR: f64 = 1e-4;
 
-/// The plot.
+/// Draws the plot.
 pub(super) fn errors_by_level(comparison: &Comparison) -> Result<String, Error> {
     let mut svg = String::new();
     draw(comparison, &mut svg).map_err(|e| Error::Failed(format!("cannot draw the plot: {e}")))?;

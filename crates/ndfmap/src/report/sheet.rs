@@ -22,7 +22,7 @@ fn direction() -> DVec3 {
     DVec3::new(0.22, 0.17, 1.0).normalize()
 }
 
-/// One column of cells: what to write above, and the values of each level shown.
+/// Column of cells: the title above it, and the values of each level shown.
 struct Column {
     title: String,
     levels: Vec<Vec<f64>>,
@@ -36,7 +36,7 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Canvas {
     let shown: Vec<(usize, Size)> =
         comparison.sizes.iter().copied().enumerate().skip(first).take(ROWS).collect();
     let columns = columns(subject, comparison, &shown);
-    // One exposure for all: white is what a thousandth of the nearest true texels exceed.
+    // All cells share one exposure: a thousandth of the nearest true texels exceed its white.
     let mut bright = columns[0].levels[0].clone();
     bright.sort_by(f64::total_cmp);
     let white = bright[bright.len() - 1 - bright.len() / 1000].max(1e-9);

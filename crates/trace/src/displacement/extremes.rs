@@ -1,4 +1,4 @@
-//! Least and greatest heights under any part of a map: what boxes around relief are made from.
+//! Least and greatest heights under any part of a map, from which boxes around relief are made.
 
 use glam::DVec2;
 use ndfmap_core::grid::Size;
@@ -9,7 +9,7 @@ use ndfmap_core::surface::{Wrap, Wraps};
 pub(super) struct Extremes {
     size: Size,
     wraps: Wraps,
-    /// Each with its size, finest first; cells at the far edges may be cut short.
+    /// Levels, each with its size, finest first; cells at the far edges may be cut short.
     levels: Vec<(Size, Vec<[f32; 2]>)>,
 }
 
@@ -67,18 +67,18 @@ fn joined(a: [f32; 2], b: [f32; 2]) -> [f32; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
 
-/// Texels on an axis, from one on; beyond the last it goes on with the first.
+/// Run of texels on an axis; beyond the axis's last texel it goes on with the first.
 struct Span {
     first: usize,
-    /// Texels, at least one and at most all.
+    /// Number of texels, at least one and at most all.
     length: usize,
     texels: usize,
 }
 
-/// The texels between whose centres the places from one to another lie.
+/// Texels between whose centres the places from `low` to `high` lie.
 fn span((low, high): (f64, f64), texels: usize, wrap: Wrap) -> Span {
     let at = |t: f64| (t * texels as f64 - 0.5).clamp(-1e15, 1e15);
-    // One more on each side, for what floats lose.
+    // One more texel on a side where floats may have rounded across its border.
     let (first, last) = ((at(low) - 1e-6).floor() as i64, (at(high) + 1e-6).floor() as i64 + 1);
     match wrap {
         Wrap::Clamp => {
@@ -93,7 +93,8 @@ fn span((low, high): (f64, f64), texels: usize, wrap: Wrap) -> Span {
 }
 
 impl Span {
-    /// The cells of a level that hold the texels, where two would at least do; those round the end too.
+    /// The cells of a level that hold the texels, if that level is coarse enough for two to do; also those
+    /// round the end.
     fn cells(&self, level: usize, count: usize) -> [Option<usize>; 4] {
         let last = self.first + self.length - 1;
         let cell = |texel: usize| Some((texel >> level).min(count - 1));

@@ -1,9 +1,9 @@
-//! Displaced meshes as they are: the facets of the surface between the heights of their maps, and none of
-//! them in memory.
+//! Displaced meshes as they are: the facets of the surface between the heights of their maps, of which none
+//! is in memory.
 //!
 //! A triangle of the base mesh is cut into facets half a texel wide, displaced along its interpolated
-//! normals. What is in memory are boxes around groups of facets; a ray that enters one goes down to its
-//! facets by quarters, whose boxes come from the least and the greatest heights under them.
+//! normals. Memory holds boxes around groups of facets; a ray that enters one goes down to its facets by
+//! quarters, whose boxes come from the least and the greatest heights under them.
 
 mod extremes;
 
@@ -27,7 +27,7 @@ const FACETS_PER_TEXEL: f64 = 2.0;
 /// Most facets along the side of a base triangle.
 const MOST_CUTS: u16 = 1 << 12;
 
-/// Facets along the side of a group, at least.
+/// Fewest facets along the side of a group.
 const LEAST_GROUP: u16 = 4;
 
 /// Most groups, but for one a base triangle: some 200 MB of boxes and hierarchy.
@@ -38,13 +38,13 @@ pub struct DisplacedMeshes {
     pieces: Vec<Piece>,
     groups: Vec<Group>,
     hierarchy: Option<CwBvh>,
-    /// As in `geometry.rs`: rays and boxes are relative to the middle of the scene.
+    /// Middle of the scene, to which rays and boxes are relative, as in `geometry.rs`.
     middle: DVec3,
     radius: f64,
     facets: u64,
 }
 
-/// A mesh.
+/// Mesh with its heights and their bounds.
 struct Piece {
     mesh: Arc<Mesh>,
     heights: Heights,
@@ -97,7 +97,7 @@ impl Node {
 pub struct FacetHit {
     group: u32,
     node: Node,
-    /// Along the unit direction of the ray.
+    /// Distance along the unit direction of the ray.
     pub distance: f64,
     barycentric: DVec2,
 }
@@ -105,11 +105,11 @@ pub struct FacetHit {
 /// The place of a hit.
 #[derive(Clone, Copy, Debug)]
 pub struct Facet {
-    /// In the world.
+    /// Position in the world.
     pub position: DVec3,
     /// Unit normal, towards the eye.
     pub normal: DVec3,
-    /// On the map, v down the rows.
+    /// Place on the map, v down the rows.
     pub uv: DVec2,
     /// Index into the scene's materials.
     pub material: usize,
@@ -183,8 +183,8 @@ impl Base<'_> {
         let high = corners.iter().fold(DVec2::NEG_INFINITY, |high, c| high.max(c.2));
         let [least, greatest] = extremes.between(low, high).map(|h| h * self.heights.depth);
         let (least, greatest) = (least.min(greatest), least.max(greatest));
-        // Between corners normals are mixed, shorter than one, and then made as long as one: heights along
-        // what was mixed are greater.
+        // Normals mixed between corners are shorter than one, and then made as long as one: along the mixed
+        // ones, heights are greater.
         let mean = (corners[0].1 + corners[1].1 + corners[2].1).normalize_or_zero();
         let shortest = corners.iter().fold(1.0, |least: f64, c| least.min(c.1.dot(mean))).max(0.05);
         let lengths = [
@@ -203,7 +203,7 @@ impl Base<'_> {
 }
 
 impl DisplacedMeshes {
-    /// Puts boxes around what has relief in a scene.
+    /// Puts boxes around the meshes of a scene that have relief.
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
         let mut shared: Vec<Option<Arc<Extremes>>> = vec![None; scene.materials.len()];
@@ -258,7 +258,7 @@ impl DisplacedMeshes {
         self.radius
     }
 
-    /// Facets that there are.
+    /// Number of facets.
     #[must_use]
     pub fn facets(&self) -> u64 {
         self.facets
@@ -332,7 +332,7 @@ impl DisplacedMeshes {
         nearest
     }
 
-    /// What lies where a ray of this direction hit.
+    /// Place that a ray of this direction hit.
     #[must_use]
     pub fn facet(&self, hit: &FacetHit, direction: DVec3) -> Facet {
         let group = &self.groups[hit.group as usize];

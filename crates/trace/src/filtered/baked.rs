@@ -1,4 +1,4 @@
-//! A baked material: look-ups of its map's channels and of what it is made of.
+//! Baked materials: look-ups of their maps' channels and of their surface parameters.
 
 use glam::{DMat2, DVec3};
 use ndfmap_core::lookup::{Lookup, Lookups, PixelFootprint, Texels};
@@ -9,7 +9,7 @@ use ndfmap_core::observe::{Cancelled, Observer};
 use ndfmap_core::pyramid::Precision;
 use ndfmap_scene::{BakedMaterial, Material, SurfaceTextures};
 
-/// What a bake makes of one material. Lights, BRDFs and models come in when shading.
+/// Baked map of one material. Lights, BRDFs and models come in when shading.
 pub(super) struct Baked {
     map: Lookup,
     /// Layers of the method itself; those of attributes follow.
@@ -25,14 +25,14 @@ pub(super) struct Shading<'a> {
     pub(super) material: &'a Material,
     pub(super) method: &'a dyn Method,
     pub(super) prepared: &'a PreparedBrdf,
-    /// On a displaced surface, how slopes of the map lie on it.
+    /// Matrix that takes slopes of the map to the surface, where it is displaced.
     pub(super) slope_map: Option<DMat2>,
-    /// In an environment, what is around the place.
+    /// Environment as the place sees it, if there is one.
     pub(super) local: Option<LocalEnvironment<'a>>,
 }
 
 impl Baked {
-    /// Bakes the map, with the finish in the lobes where the method has lobes that can carry it.
+    /// Bakes the map, with colours and roughness in the lobes where the method has lobes that can carry them.
     pub(super) fn new(
         material: &Material,
         method: &AnyMethod,

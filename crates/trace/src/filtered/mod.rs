@@ -1,8 +1,8 @@
 //! Shading through a representation: one look-up a pixel, as wide as the pixel's reach on the map.
 //!
-//! Where the pixels around a pixel show another surface than its own, it is cut into 4 × 4 parts that are
-//! shaded apart, each at its own reach, as a rasteriser's multisampling would have it: what is measured is
-//! the filtering of maps, not of outlines.
+//! A pixel whose neighbours show another surface than its own is cut into 4 × 4 parts that are shaded apart,
+//! each at its own reach, as a rasteriser's multisampling would have it: the measure is for the filtering of
+//! maps, not of outlines.
 
 mod baked;
 
@@ -29,7 +29,7 @@ use crate::incident_directions;
 const PARTS: usize = 4;
 
 /// The maps of a scene's materials, baked with one method. Camera, lights, BRDFs, models and meshes may
-/// change after.
+/// change afterwards.
 pub struct BakedMaps {
     method: AnyMethod,
     materials: Vec<Baked>,
@@ -60,16 +60,16 @@ impl BakedMaps {
 pub struct Filtered<'a> {
     /// The scene.
     pub scene: &'a Scene,
-    /// Its triangles.
+    /// Triangles of the scene.
     pub geometry: &'a Geometry,
-    /// Its maps.
+    /// Baked maps of its materials.
     pub maps: &'a BakedMaps,
 }
 
 /// Rows that are worked out together.
 const BAND: usize = 16;
 
-/// What is the same for all pixels.
+/// Data that all pixels share.
 #[derive(Clone, Copy)]
 struct How<'a> {
     lookups: Lookups,
@@ -78,7 +78,7 @@ struct How<'a> {
     around: Option<&'a EnvironmentShading<'a>>,
 }
 
-/// An environment that a scene stands in, and what its materials make of it.
+/// Environment that a scene stands in, with the split sums of its materials.
 struct EnvironmentShading<'a> {
     environment: &'a SceneEnvironment,
     to_environment: DMat3,
@@ -95,7 +95,7 @@ impl<'a> EnvironmentShading<'a> {
         Self { environment, to_environment, suns, split_sums }
     }
 
-    /// What surrounds a place.
+    /// Environment as a place sees it.
     fn at(&self, place: &Place, wo: DVec3) -> LocalEnvironment<'_> {
         LocalEnvironment {
             light: &self.environment.filtered,
@@ -206,7 +206,7 @@ impl Filtered<'_> {
         let lit = |(directions, irradiance)| IncidentLight { directions, irradiance };
         scratch.lights.extend(of_scene.map(lit));
         let local = how.around.map(|around| {
-            // Of an environment normals see what the base surface does not.
+            // Normals also see the part of an environment that is below the base surface.
             let suns =
                 incident_directions(&around.suns, (place.position, place.frame), wo, Directions::between);
             scratch.lights.extend(suns.map(lit));
@@ -229,7 +229,7 @@ impl Filtered<'_> {
     }
 }
 
-/// True where the pixels around a pixel show something else than its own surface goes on to.
+/// True where a pixel beside this one shows something other than the continuation of this one's surface.
 fn outline(hits: &[Option<(Hit, Place)>], size: Size, i: usize) -> bool {
     let (x, y) = (i % size.width, i / size.width);
     let around = [

@@ -1,9 +1,9 @@
-//! Light of an environment by chance: directions from where it is bright, from where the lobe is, and from
+//! Light of an environment by Monte Carlo: directions are drawn where it is bright, where the lobe is, and
 //! where a diffuse facet looks.
 //!
 //! Each ray draws one direction of each kind, and every one counts by the sum of all their densities (the
-//! balance heuristic of Veach and Guibas 1995): what is likely by any of them is never divided by little. The
-//! environment is the picture itself, its sun included.
+//! balance heuristic of Veach and Guibas 1995): a direction that is likely by any of them is never divided by
+//! a small density. The environment is the picture itself, its sun included.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,14 +12,14 @@ use ndfmap_core::brdf::{Brdf, Directions, Microfacets, SurfaceParams};
 use ndfmap_core::light::environment::{Environment, EnvironmentSampler, SceneEnvironment};
 use ndfmap_core::sphere::frame;
 
-/// Where directions are drawn from.
+/// Environment from which directions are drawn.
 pub(super) struct SampledEnvironment<'a> {
     map: &'a Environment,
     sampler: EnvironmentSampler,
     to_environment: DMat3,
 }
 
-/// What the directions of one ray are drawn by: two numbers in [0, 1) for each kind.
+/// Numbers that draw the directions of one ray: two in [0, 1) for each kind.
 pub(super) type Numbers = [DVec2; 3];
 
 /// Numbers of a pixel's rays, one after the other spread more evenly than chance would have them: the
@@ -29,7 +29,7 @@ pub(super) fn numbers(begin: [[f64; 2]; 3], ray: usize) -> Numbers {
     begin.map(|at| (DVec2::from(at) + STEP * ray as f64).fract())
 }
 
-/// A facet that is lit: frame of the tangent space, in which all else is.
+/// Lit facet: the frame of its tangent space, and all else in that frame.
 pub(super) struct LitFacet<'a> {
     pub(super) frame: DMat3,
     pub(super) wo: DVec3,
@@ -39,7 +39,7 @@ pub(super) struct LitFacet<'a> {
 }
 
 impl LitFacet<'_> {
-    /// Width of facets that are drawn: GGX as wide as the lobe has weight wherever it has.
+    /// Squared width of the facets that are drawn: GGX as wide as the lobe, with weight wherever it has any.
     fn alpha_squared(&self) -> f64 {
         (2.0 * self.brdf.width(self.params.roughness).get()).max(1e-9)
     }
@@ -51,7 +51,7 @@ impl LitFacet<'_> {
         wh * (2.0 * wh.dot(self.wo)) - self.wo
     }
 
-    /// Density of those, per solid angle.
+    /// Density of these directions, per solid angle.
     fn mirror_density(&self, directions: &Directions) -> f64 {
         let z = directions.wh.dot(self.n);
         if z <= 0.0 || directions.u <= 0.0 {
@@ -77,7 +77,7 @@ impl<'a> SampledEnvironment<'a> {
         }
     }
 
-    /// An estimate of the light that a facet sends to the eye, of what comes from directions that are `open`.
+    /// Estimate of the light that a facet sends to the eye, from directions that are `open`.
     pub(super) fn light(
         &self,
         shown: &LitFacet<'_>,

@@ -1,10 +1,10 @@
-//! Brute force: what a pixel of a normal-mapped scene shows, by many rays, with the map as it is.
+//! Brute force: the pixels of a normal-mapped scene by many rays, with the map as it is.
 //!
 //! Each ray shades one texel of the finest level, without masking or shadowing, so that a pixel tends to the
-//! plain mean of the BRDF over what it covers. Between texels the map is the bilinear mix of what the texels
-//! *reflect*, as texture units filter level 0: a ray takes the texel under a point displaced by up to half a
-//! texel either way, which has that mean. Nothing here knows of `ndfmap_core::ndf`. An environment's light is
-//! sampled, by `environment.rs`.
+//! plain mean of the BRDF over its footprint. Between texels the map is the bilinear mix of the *reflected
+//! light* of the texels, as texture units filter level 0: a ray takes the texel under a point displaced by up
+//! to half a texel either way, which has that mean. Nothing here uses `ndfmap_core::ndf`. `environment.rs`
+//! samples an environment's light.
 
 mod environment;
 
@@ -33,7 +33,7 @@ const STRATA: usize = 4;
 /// Rays a pixel in the least truth: one pass for each of the two halves whose difference is the noise.
 pub const LEAST_RAYS: usize = 2 * STRATA * STRATA;
 
-/// Normals of the finest level, and what they belong to.
+/// Normals of the finest level, and the material they belong to.
 struct Finest<'a> {
     material: &'a Material,
     normals: Grid<Vec3>,
@@ -51,7 +51,7 @@ impl Finest<'_> {
         )
     }
 
-    /// What a texel is made of.
+    /// Surface parameters of a texel.
     fn finish(&self, x: usize, y: usize) -> SurfaceParams {
         let own = self.material.params;
         self.material.textures.as_ref().map_or(own, |map| map.at(x, y, own.specular))
@@ -62,7 +62,7 @@ impl Finest<'_> {
 pub struct Truth<'a> {
     scene: &'a Scene,
     geometry: &'a Geometry,
-    /// What of the scene is displaced; the rest is in `geometry`.
+    /// Displaced meshes of the scene; the rest is in `geometry`.
     displacement: Option<&'a DisplacedMeshes>,
     materials: Vec<Finest<'a>>,
     environment: Option<SampledEnvironment<'a>>,
@@ -93,8 +93,8 @@ impl<'a> Truth<'a> {
         }
     }
 
-    /// The same of a displaced scene: the meshes that have relief by its facets, and by `geometry` those that
-    /// have none.
+    /// Reads the maps of a displaced scene: rays hit meshes with relief by the facets of `displacement`, and
+    /// those without by `geometry`.
     #[must_use]
     pub fn displaced(scene: &'a Scene, geometry: &'a Geometry, displacement: &'a DisplacedMeshes) -> Self {
         Self { displacement: Some(displacement), ..Self::new(scene, geometry) }
@@ -153,9 +153,9 @@ impl<'a> Truth<'a> {
         }
     }
 
-    /// The truth in every frame of a drift, twice, from independent rays: their mean is the truth, and half
-    /// of what parts them its noise. `rays` are those of one pixel in one frame, in both together; 512 at
-    /// least.
+    /// The truth in every frame of a drift, twice, from independent rays: the mean of the two is the truth,
+    /// and half of their difference is its noise. `rays` are those of one pixel in one frame, in both
+    /// together; 512 at least.
     ///
     /// # Errors
     /// [`Cancelled`] by the observer.
@@ -204,7 +204,7 @@ impl<'a> Truth<'a> {
     /// Sum over one ray through each stratum of a pixel.
     fn pass(&self, rays: &Rays, pixel: DVec2, stream: [u64; 3]) -> DVec3 {
         let mut random = Pcg64Mcg::seed_from_u64(mix(stream));
-        // A pixel's own beginning, the same for all passes of one half.
+        // The pixel's own start of the numbers, the same for all passes of one half.
         let [seed, pass, at] = stream;
         let begin = || Pcg64Mcg::seed_from_u64(mix([!seed, pass % 2, at])).random();
         let begin = self.environment.as_ref().map(|_| begin()).unwrap_or_default();
@@ -218,7 +218,7 @@ impl<'a> Truth<'a> {
         sum
     }
 
-    /// What comes along a ray through a square of the picture, at a place and of a width in pixels.
+    /// Light along a ray through a square of the picture: its corner and width are in pixels.
     fn ray(
         &self,
         rays: &Rays,
@@ -245,8 +245,8 @@ impl<'a> Truth<'a> {
         }
     }
 
-    /// Light that a facet of relief sends to the eye, made of what the texel `displaced` from it is. Where
-    /// facets shade each other, a light that something stands before adds nothing.
+    /// Light that a facet of relief sends to the eye, with the surface parameters of the texel `displaced`
+    /// from it. Where facets shade each other, a light that is hidden from the facet adds nothing.
     fn shade_facet(&self, facet: &Facet, eye: DVec3, (displaced, numbers): (DVec2, Numbers)) -> DVec3 {
         let finest = &self.materials[facet.material];
         let (x, y) = finest.texel(facet.uv, displaced);
@@ -320,10 +320,10 @@ impl<'a> Truth<'a> {
     }
 }
 
-/// What a shadow ray starts off the surface by, of the scene's size.
+/// Distance off the surface at which a shadow ray starts, as a fraction of the scene's size.
 const LIFT: f64 = 1e-7;
 
-/// One seed of several numbers (the finaliser of SplitMix64, Steele et al. 2014, over a running sum).
+/// Seed made of several numbers (the finaliser of SplitMix64, Steele et al. 2014, over a running sum).
 fn mix(stream: [u64; 3]) -> u64 {
     stream.iter().fold(0, |state: u64, value| {
         let mut z = (state ^ value).wrapping_add(0x9e37_79b9_7f4a_7c15);

@@ -3,8 +3,8 @@
 //!
 //! Alternating least squares, none of the factors negative, over the means of `phi_d`. Errors count relative
 //! to the reflectance around them, so that the tail counts beside a peak a thousand times as high, and by
-//! what a pair of directions exchanges: solid angle and both cosines, without which all would be about
-//! grazing angles. What is left of it all is measured over the table as it is, with no such weight.
+//! what a pair of directions exchanges: solid angle and both cosines, without which grazing angles would
+//! decide everything. The residual is measured over the table as it is, with no such weight.
 
 use std::f64::consts::PI;
 
@@ -16,13 +16,13 @@ use super::{LobeFactors, kernel};
 /// Bins of `theta_h` and of `theta_d` in a MERL table, to 90 degrees.
 pub const BINS: usize = 90;
 
-/// What a fit leaves of a table, as the root of the sum of squares over that of the table itself, each by
-/// solid angle, and times both cosines: what is exchanged.
+/// Error that a fit leaves of a table: the root of its sum of squares over that of the table itself. Each
+/// square counts by solid angle, and times both cosines: by what is exchanged.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Residual {
-    /// Of `kd + f g`, as tabulated.
+    /// Error of `kd + f g`, as tabulated.
     pub factored: f64,
-    /// Of the lobe in the end: kernels and polynomial.
+    /// Error of the lobe in the end: kernels and polynomial.
     pub fitted: f64,
 }
 
@@ -39,7 +39,7 @@ fn difference_angle(i: f64) -> f64 {
     i / BINS as f64 * PI / 2.0
 }
 
-/// Directions to the light and to the eye, of Rusinkiewicz' angles.
+/// Directions to the light and to the eye, from Rusinkiewicz' angles.
 fn directions(theta_h: f64, theta_d: f64, phi_d: f64) -> (DVec3, DVec3) {
     let (sin, cos) = theta_h.sin_cos();
     let wh = DVec3::new(sin, 0.0, cos);
@@ -50,18 +50,18 @@ fn directions(theta_h: f64, theta_d: f64, phi_d: f64) -> (DVec3, DVec3) {
     (wi, 2.0 * wi.dot(wh) * wh - wi)
 }
 
-/// Variances of the kernels: from a fiftieth of a degree to half the hemisphere, each 1.23 times the one
-/// before: between two of them any other is made to 1 %.
+/// Number of kernels. Their variances go from a fiftieth of a degree to half the hemisphere, each 1.23 times
+/// the one before, so that two of them make any other between them to 1 %.
 const KERNELS: usize = 75;
 
-/// Sweeps of the descent over them.
+/// Sweeps of the descent over the kernels.
 const SWEEPS: usize = 4000;
 
 fn variance(k: usize) -> f64 {
     1e-7 * (0.4_f64 / 1e-7).powf(k as f64 / (KERNELS - 1) as f64)
 }
 
-/// Means over `phi_d` of what was measured at a pair of angles.
+/// Means over `phi_d` of the measurements at a pair of angles.
 #[derive(Clone, Copy, Default)]
 struct Cell {
     mean: DVec3,
@@ -128,7 +128,7 @@ struct Tables {
     diffuse: DVec3,
     f: Vec<f64>,
     g: Vec<DVec3>,
-    /// Reflectance below which nothing of f matters.
+    /// Reflectance below which f does not matter.
     floor: f64,
 }
 
@@ -140,7 +140,7 @@ impl Tables {
         let at = |h: usize, d: usize| cells[h * BINS + d];
         let mut diffuse = dim(cells);
         let floor = 0.05 * diffuse.element_sum() / 3.0 + 1e-4;
-        // Relative to what is around: the mean over a row, and the floor.
+        // Errors count relative to the reflectance around: the mean over a row, and the floor.
         let around = |h: usize| {
             let (sum, weight) = (0..BINS).map(|d| at(h, d)).fold((0.0, 0.0), |(sum, weight), cell| {
                 (sum + cell.weight * cell.mean.element_sum() / 3.0, weight + cell.weight)
@@ -169,7 +169,7 @@ impl Tables {
                 }
                 *g = if square > 0.0 { (sum / square).max(DVec3::ZERO) } else { DVec3::ZERO };
             }
-            // g is one on the whole, so that f is the lobe.
+            // g is scaled to a mean of one, so that f is the lobe.
             let (mut sum, mut all) = (0.0, 0.0);
             for (cell, g) in cells.iter().zip(g.iter().cycle()) {
                 sum += cell.weight * g.element_sum() / 3.0;
@@ -197,7 +197,8 @@ impl Tables {
 
     /// f as kernels, none of negative weight, by coordinate descent.
     fn kernels(&self) -> Vec<(f64, f64)> {
-        // Bin by bin, relative to what is there: by solid angle the peak would have no say in its own height.
+        // Each bin counts relative to its own value: by solid angle, the peak would have no say in its own
+        // height.
         let weight = |h: usize| 1.0 / (self.f[h] + self.floor);
         let column = |k: usize| -> Vec<f64> {
             (0..BINS).map(|h| weight(h) * kernel(variance(k), half_angle(h as f64 + 0.5).cos())).collect()
@@ -219,9 +220,9 @@ impl Tables {
         alive.map(|(k, w)| (*w, variance(k))).collect()
     }
 
-    /// g times `cos² theta_d`, as a polynomial in `1 - cos theta_d`: reflectances have the two cosines to the
-    /// normal below them, which for the narrow half angles of a highlight are both that, and what is above
-    /// them is smooth.
+    /// g times `cos² theta_d`, as a polynomial in `1 - cos theta_d`: a reflectance is a fraction over the two
+    /// cosines to the normal, which at the narrow half angles of a highlight are both `cos theta_d`, and its
+    /// numerator is smooth.
     fn tint(&self, cells: &[Cell]) -> [DVec3; 6] {
         let mut normal = SMatrix::<f64, 6, 6>::zeros();
         let mut right = SMatrix::<f64, 6, 3>::zeros();
@@ -242,8 +243,7 @@ impl Tables {
     }
 }
 
-/// The reflectance that a tenth of the table, by weight, is darker than, channel by channel: where the
-/// highlight is not.
+/// Reflectance away from the highlight, channel by channel: a tenth of the table, by weight, is darker.
 fn dim(cells: &[Cell]) -> DVec3 {
     let tenth = 0.1 * cells.iter().map(|c| c.weight).sum::<f64>();
     let of = |channel: usize| {

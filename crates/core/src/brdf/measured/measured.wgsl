@@ -1,5 +1,5 @@
 // A measured lobe: a sum of kernels, and a colour. Twin of measured/mod.rs, which writes the numbers in;
-// `base` is what it is widened by.
+// `base` is the slope variance that widens it.
 
 // True for a lobe around the half-vector.
 const SPECULAR: bool = true;

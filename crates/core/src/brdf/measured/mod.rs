@@ -2,8 +2,8 @@
 //!
 //! Han et al. 2007, section 4, take measured materials in the factored form of Lawrence et al. 2006: f is a
 //! lobe around the half-vector, and g does not depend on the normal. The factors are fitted to a table of
-//! measurements (`factor.rs`), or to one that published fits stand in for (`analytic.rs`); what the fit
-//! leaves is in [`Residual`]. f is stored as a sum of von Mises-Fisher kernels, none of negative weight:
+//! measurements (`factor.rs`), or to a table of values of a published fit (`analytic.rs`); [`Residual`] has
+//! the error that this leaves. f is stored as a sum of von Mises-Fisher kernels, none of negative weight:
 //! convolving with a lobe of normals adds its variance to each kernel's, which is what the paper's zonal
 //! series `Σ Lambda_l rho_l Y_l0` does order by order, without its hundreds of orders for a shiny material
 //! (`docs/decisions.md`). With Han et al.'s factor `max(n·wi, 0)` the lobe is the measured reflectance
@@ -28,10 +28,10 @@ use crate::words;
 /// A measured lobe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
-    /// As on the command line.
+    /// Name, as on the command line.
     name: String,
     fit: Arc<LobeFactors>,
-    /// What it was widened by.
+    /// Slope variance that widened it.
     widened: SlopeVariance,
 }
 
@@ -43,9 +43,9 @@ pub struct LobeFactors {
     /// Kernels of f: weight, and variance on one axis.
     pub kernels: Vec<(f64, f64)>,
     /// `g cos² theta_d` as a polynomial in `1 - cos theta_d`, from the constant up; below zero it counts as
-    /// nothing.
+    /// zero.
     pub tint: [DVec3; 6],
-    /// What the fit leaves.
+    /// Error that the fit leaves.
     pub residual: Residual,
 }
 
@@ -76,7 +76,7 @@ pub enum PublishedFit {
 
 words!(PublishedFit { Sgd => "sgd", Abc => "abc" });
 
-/// Names of the materials that there are published fits of.
+/// Names of the materials with published fits.
 #[must_use]
 pub fn materials() -> Vec<&'static str> {
     analytic::names()
@@ -97,14 +97,14 @@ impl Measured {
     /// A sentence that says what is wrong with the name, and which is nearest.
     pub fn published(fit: PublishedFit, name: &str) -> Result<Self, String> {
         let reflectance = published(fit, name)?;
-        // The fits do not depend on more than these sixteen tell apart.
+        // Sixteen bins tell apart all that the fits depend on.
         Ok(Self::new(&format!("{fit}:{name}"), 16, |wi, wo, _| Some(reflectance(wi, wo))))
     }
 
     /// Factors a table of measurements: reflectance, RGB, for directions to the light and the eye (the normal
-    /// is z), which `turns` bins of `phi_d` from 0 to 180 degrees are asked for at every pair of `theta_h`
-    /// and `theta_d`; the third number is the bin's, counted over all, `(theta_h × 90 + theta_d) × turns +
-    /// phi_d`. `None` where nothing was measured.
+    /// is z). Every pair of `theta_h` and `theta_d` is asked for in `turns` bins of `phi_d` from 0 to 180
+    /// degrees. The third number is the bin's, counted over all, `(theta_h × 90 + theta_d) × turns + phi_d`.
+    /// `None` where nothing was measured.
     #[must_use]
     pub fn new(name: &str, turns: usize, reflectance: impl Fn(DVec3, DVec3, usize) -> Option<DVec3>) -> Self {
         let fit = factor::factor(turns, reflectance);
@@ -121,17 +121,17 @@ impl Measured {
     }
 }
 
-/// A von Mises-Fisher kernel of this variance, `1/kappa`, at the cosine `u`; its light over the sphere is
-/// one.
+/// A von Mises-Fisher kernel of this variance, `1/kappa`, at the cosine `u`; it integrates to one over the
+/// sphere.
 fn kernel(variance: f64, u: f64) -> f64 {
     let kappa = 1.0 / variance;
     kappa / (2.0 * PI * -(-2.0 * kappa).exp_m1()) * (kappa * (u - 1.0)).exp()
 }
 
-/// Least cosine that g is divided by the square of: 87 degrees, where measurements end.
+/// Least cosine whose square divides g: 87 degrees, where measurements end.
 const LEAST_COSINE: f64 = 0.05;
 
-/// g of its polynomial, at the cosine of `theta_d`.
+/// g from its polynomial, at the cosine of `theta_d`.
 fn colour(tint: &[DVec3; 6], u: f64) -> DVec3 {
     let u = u.clamp(LEAST_COSINE, 1.0);
     tint.iter().rev().fold(DVec3::ZERO, |sum, c| sum * (1.0 - u) + *c).max(DVec3::ZERO) / (u * u)
@@ -207,7 +207,7 @@ impl Lobe for Measured {
         text.into()
     }
 
-    /// What it was widened by; the rest is in the text.
+    /// Slope variance that widened it; the rest is in the text.
     fn base(&self) -> f64 {
         self.widened.get()
     }
@@ -278,7 +278,7 @@ mod tests {
                 }
                 let got = lobe.evaluate_widened(SlopeVariance::clamped(v), u);
                 // Variances add exactly for Gaussians in the plane; on the sphere to some 2 % of the peak at
-                // this width. The series itself rings by exp(-48² v/2), nothing.
+                // this width. The series itself rings by exp(-48² v/2), which is nothing.
                 assert!((got - sum).abs() < 0.02 * peak, "{name} at {u}: {got} {sum}");
             }
         }

@@ -1,4 +1,4 @@
-//! Built-in environments: what can be seen and tested without a file.
+//! Built-in environments, to look at and to test with, without a file.
 
 use glam::{DVec3, Vec3};
 
@@ -7,9 +7,9 @@ use crate::grid::{Grid, Size};
 
 /// A row of [`TABLE`].
 pub struct Row {
-    /// Its name on the command line, after `builtin:`.
+    /// Name on the command line, after `builtin:`.
     pub name: &'static str,
-    /// One line for help and docs.
+    /// Summary in one line, for help and docs.
     pub summary: &'static str,
     /// Radiance from a direction.
     radiance: fn(DVec3) -> DVec3,

@@ -16,7 +16,7 @@ pub(super) const LEAST_SIDE: usize = 4;
 /// Texels on a side of the finest level, at most: 0.35 degrees each.
 const MOST_SIDE: usize = 256;
 
-/// Points over a texel, on each axis, whose mean it is.
+/// Points over a texel, on each axis; the texel is their mean.
 const POINTS: usize = 4;
 
 /// A function on the sphere, level by level.
@@ -41,7 +41,7 @@ pub fn cube_direction(face: usize, s: f64, t: f64) -> DVec3 {
     }
 }
 
-/// The face that a direction goes through, and where.
+/// Face that a direction goes through, and the place on it.
 pub(super) fn cube_place(w: DVec3) -> (usize, DVec2) {
     let a = w.abs();
     if a.x >= a.y && a.x >= a.z {
@@ -56,8 +56,8 @@ pub(super) fn cube_place(w: DVec3) -> (usize, DVec2) {
 }
 
 impl Cube {
-    /// An environment on a cube: about as fine as it is, and in each coarser level the mean over a texel's
-    /// solid angle.
+    /// An environment on a cube: the finest level about as fine as the picture, and each coarser one the mean
+    /// over a texel's solid angle.
     #[must_use]
     pub fn of(environment: &Environment) -> Self {
         let side = (environment.size().height / 2).next_power_of_two().clamp(4 * LEAST_SIDE, MOST_SIDE);
@@ -71,7 +71,7 @@ impl Cube {
         cube
     }
 
-    /// The cube with its levels but the finest as a function of level and direction.
+    /// The cube with every level but the finest made anew, by a function of level and direction.
     pub(super) fn with_levels(&self, f: impl Fn(usize, DVec3) -> DVec3 + Sync) -> Self {
         let level = |l: usize| {
             let side = self.side_of(l);
@@ -102,7 +102,7 @@ impl Cube {
         self.side >> level
     }
 
-    /// How many levels there are.
+    /// Number of levels.
     #[must_use]
     pub fn levels(&self) -> usize {
         self.levels.len()
@@ -114,7 +114,7 @@ impl Cube {
         &self.levels[level]
     }
 
-    /// Mixed from the four texels around a direction.
+    /// The function in a direction, mixed from the four texels around it.
     fn bilinear(&self, w: DVec3, level: usize) -> DVec3 {
         let side = self.side_of(level);
         let (face, at) = cube_place(w);
@@ -127,7 +127,7 @@ impl Cube {
             .lerp(texel(x, y + 1).lerp(texel(x + 1, y + 1), part.x), part.y)
     }
 
-    /// The function in a direction, mixed between two levels; `lod` is held to those that there are.
+    /// The function in a direction, mixed between two levels; `lod` is held to the levels that exist.
     #[must_use]
     pub fn lookup(&self, w: DVec3, lod: f64) -> DVec3 {
         let lod = lod.clamp(0.0, (self.levels.len() - 1) as f64);
@@ -137,8 +137,8 @@ impl Cube {
     }
 }
 
-/// The level with one value for each direction: that of a texel on an edge is the mean of those that the
-/// faces around have for it.
+/// The level with one value for each direction: a texel on an edge gets the mean of the values that the faces
+/// around have for it.
 fn joined(side: usize, level: Vec<Vec3>) -> Vec<Vec3> {
     let mut joined = level.clone();
     let last = side - 1;
@@ -164,7 +164,7 @@ fn joined(side: usize, level: Vec<Vec3>) -> Vec<Vec3> {
     joined
 }
 
-/// Where the middle of a texel is on its face.
+/// Place of a texel's middle on its face.
 fn place(i: usize, side: usize) -> f64 {
     2.0 * i as f64 / (side - 1) as f64 - 1.0
 }

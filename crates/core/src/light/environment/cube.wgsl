@@ -6,7 +6,7 @@ struct CubePlace {
     at: vec2<f32>,
 }
 
-// The face that a direction goes through, and where.
+// Face that a direction goes through, and the place on it.
 fn cube_place(w: vec3<f32>) -> CubePlace {
     let a = abs(w);
     if a.x >= a.y && a.x >= a.z {
@@ -27,15 +27,15 @@ fn cube_place(w: vec3<f32>) -> CubePlace {
     return CubePlace(5u, vec2<f32>(-w.x, -w.y) / a.z);
 }
 
-// Mixed from the four texels around a place, of a level with so many on a side: outermost texels lie on the
-// face's edges.
+// The function at a place of a level, mixed from the four texels around it. The level has `side` texels on a
+// side, and its outermost texels lie on the face's edges.
 fn cube_bilinear(cube: texture_2d_array<f32>, linear: sampler, place: CubePlace, level: f32, side: f32) -> vec3<f32> {
     let uv = ((place.at + 1.0) * 0.5 * (side - 1.0) + 0.5) / side;
     return textureSampleLevel(cube, linear, uv, place.face, level).xyz;
 }
 
-// The function in a direction, mixed between two levels; `lod` is held to those that there are. `size` is
-// texels on a side of the finest level, and how many levels there are.
+// The function in a direction, mixed between two levels; `lod` is held to the levels that exist. `size` has
+// the texels on a side of the finest level, and the number of levels.
 fn cube_lookup(cube: texture_2d_array<f32>, linear: sampler, w: vec3<f32>, lod: f32, size: vec2<f32>) -> vec3<f32> {
     let held = clamp(lod, 0.0, size.y - 1.0);
     let level = floor(held);

@@ -1,4 +1,4 @@
-// An environment as shading looks it up. Twin of filtered.rs.
+// Environment as shading looks it up. Twin of filtered.rs.
 //
 // A host brings `environment`, a uniform; `environment_radiance` and `environment_blurred`, the cubes, as
 // functions of a direction and a level; `half_vector_coefficient`, of a view and an index; and
@@ -9,20 +9,20 @@ const PREFILTERED: u32 = 1u;
 const HARMONICS: u32 = 2u;
 
 struct Environment {
-    // From directions of the world to the environment's own.
+    // Rotation from directions of the world to the environment's own.
     rotation: mat3x3<f32>,
-    // Nine harmonics of its light, small bright sources apart; and in w of the first three, red, green and
-    // blue of the least that a normal receives.
+    // Nine harmonics of its light, without small bright sources; and in w of the first three, red, green and
+    // blue of the least irradiance that a normal receives.
     irradiance: array<vec4<f32>, 9>,
-    // Texels on a side of the cubes' finest level, and how many levels there are.
+    // Texels on a side of the cubes' finest level, and the number of levels.
     size: vec2<f32>,
-    // What the cubes' texels are times.
+    // Factor that multiplies the cubes' texels.
     scale: f32,
     // PREFILTERED, HARMONICS, or 0.
     technique: u32,
 }
 
-// The level of a blurred cube so many times as rough as a lobe; levels are even in perceptual roughness.
+// Level of a blurred cube that is `times` as rough as a lobe; levels are even in perceptual roughness.
 fn blurred_level(width: f32, times: f32) -> f32 {
     return min(times * min(sqrt(sqrt(2.0 * width)), 1.0), 1.0) * (environment.size.y - 1.0);
 }

@@ -1,4 +1,4 @@
-//! What shading looks up of an environment, made from it once.
+//! Environments, filtered once for shading to look up.
 
 use std::sync::{Arc, OnceLock};
 
@@ -8,11 +8,11 @@ use super::{Cube, Environment, HalfVectors, Irradiance, Suns, without_suns};
 use crate::brdf::Microfacets;
 use crate::light::Light;
 
-/// How lobes of normals meet an environment's highlights.
+/// Technique by which lobes of normals reflect an environment in highlights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Technique {
-    /// Each lobe looks up a cube that microfacets as wide as it have blurred, where what it reflects comes
-    /// from.
+    /// Cubes blurred by microfacets: each lobe looks up one blurred as wide as itself, in the direction that
+    /// its light comes from.
     #[default]
     Prefiltered,
     /// Han et al.'s sum over spherical harmonics of the half-vector, to order 8.
@@ -23,7 +23,7 @@ impl Technique {
     /// Every technique.
     pub const ALL: [Self; 2] = [Self::Prefiltered, Self::Harmonics];
 
-    /// As spelled on the command line.
+    /// Spelling on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -32,7 +32,7 @@ impl Technique {
         }
     }
 
-    /// Its number in shaders.
+    /// Number of the technique in shaders.
     #[must_use]
     pub fn index(self) -> u32 {
         self as u32 + 1
@@ -42,9 +42,9 @@ impl Technique {
 /// An environment as shading looks it up.
 #[derive(Debug)]
 pub struct FilteredEnvironment {
-    /// Small bright sources, which shine as lights of their own. All else is without them.
+    /// Small bright sources, which shine as lights of their own. Everything else here leaves them out.
     pub suns: Suns,
-    /// What diffuse facets receive.
+    /// Irradiance that diffuse facets receive.
     pub irradiance: Irradiance,
     /// The light itself, at several widths.
     pub radiance: Cube,
@@ -55,7 +55,7 @@ pub struct FilteredEnvironment {
 }
 
 impl FilteredEnvironment {
-    /// Prepares an environment; what only some shading wants is made when first asked for.
+    /// Prepares an environment; parts that only some shading needs are made when first asked for.
     #[must_use]
     pub fn new(environment: &Environment) -> Self {
         let (rest, suns) = without_suns(environment);
@@ -70,7 +70,7 @@ impl FilteredEnvironment {
         }
     }
 
-    /// The cube that these microfacets have blurred.
+    /// Cube blurred by these microfacets.
     #[must_use]
     pub fn prefiltered(&self, microfacets: Microfacets) -> &Cube {
         let made = match microfacets {
@@ -80,8 +80,9 @@ impl FilteredEnvironment {
         made.get_or_init(|| microfacets.filter(&self.radiance))
     }
 
-    /// Makes now what a technique wants of it. What is made when first asked for is made by all threads
-    /// together, and must not be asked for first from within what they already do together.
+    /// Makes all that a technique needs, ahead of time. Call this before a parallel section: parts are made,
+    /// when first asked for, by all threads together, so the first request must not come from within other
+    /// work that the threads share.
     pub fn make(&self, technique: Technique, microfacets: Microfacets) {
         match technique {
             Technique::Prefiltered => drop(self.prefiltered(microfacets)),
@@ -101,11 +102,11 @@ impl FilteredEnvironment {
 pub struct SceneEnvironment {
     /// The light itself, as a picture by latitude and longitude.
     pub map: Arc<Environment>,
-    /// The same, filtered.
+    /// The light, filtered for shading.
     pub filtered: Arc<FilteredEnvironment>,
-    /// How far it is turned around the vertical, in radians: what was ahead moves to the right.
+    /// Rotation around the vertical, in radians: what was ahead moves to the right.
     pub rotation: f64,
-    /// How highlights look it up.
+    /// Technique by which highlights look it up.
     pub technique: Technique,
 }
 
@@ -121,7 +122,7 @@ impl SceneEnvironment {
         }
     }
 
-    /// From directions of the world to the environment's own.
+    /// Rotation from directions of the world to the environment's own.
     #[must_use]
     pub fn to_environment(&self) -> DMat3 {
         DMat3::from_rotation_y(self.rotation)
@@ -154,7 +155,7 @@ mod tests {
             rotation: std::f64::consts::FRAC_PI_2,
             ..SceneEnvironment::new(smooth(Size { width: 32, height: 16 }))
         };
-        // What is now seen on the right is what the picture has ahead.
+        // The right now shows what the picture has ahead.
         assert!((turned.to_environment() * DVec3::X - DVec3::NEG_Z).length() < 1e-15);
         assert!(turned.suns().is_empty());
     }

@@ -21,7 +21,7 @@ pub const VIEWS: usize = 16;
 
 const COUNT: usize = sh_count(HALF_VECTOR_ORDER);
 
-/// Texels that light is taken from, around: 2.8 degrees each, where order 8 tells 22 apart.
+/// Texels around, of the picture that light is taken from: 2.8 degrees each, while order 8 resolves 22.
 const TEXELS: usize = 128;
 
 /// Light over half-vectors, for every view of the grid.
@@ -58,8 +58,8 @@ impl HalfVectors {
         &self.coefficients
     }
 
-    /// `Σ zonal_l L'_lm Y_lm(mu)` for an eye in a direction: between the four views around it. What rings
-    /// below zero is held there.
+    /// `Σ zonal_l L'_lm Y_lm(mu)` for an eye in a direction, interpolated between the four views around it.
+    /// Ringing below zero is clamped to zero.
     #[must_use]
     pub fn evaluate(&self, wo: DVec3, mu: DVec3, zonal: &[f64; HALF_VECTOR_ORDER + 1]) -> DVec3 {
         let mut basis = [0.0; COUNT];
@@ -83,7 +83,7 @@ fn view_direction(i: usize, j: usize) -> DVec3 {
     DVec3::new(sin * sin_phi, cos, -sin * cos_phi)
 }
 
-/// The four views around a direction, and where between them it is.
+/// The four views around a direction, and its place between them.
 fn views_around(wo: DVec3) -> ([usize; 4], DVec2) {
     let around = wo.x.atan2(-wo.z).rem_euclid(TAU) / TAU * VIEWS as f64;
     let down = wo.y.clamp(-1.0, 1.0).acos() / PI * (VIEWS - 1) as f64;

@@ -5,7 +5,7 @@ const HALF_VECTOR_ORDER: u32 = 8u;
 // Views on each axis of the grid.
 const VIEWS: u32 = 16u;
 
-// The four views around a direction, and what each counts.
+// The four views around a direction, and the weight of each.
 struct ViewsAround {
     views: vec4<u32>,
     weights: vec4<f32>,
@@ -24,7 +24,7 @@ fn views_around(wo: vec3<f32>) -> ViewsAround {
     return ViewsAround(views, vec4<f32>((1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y));
 }
 
-// A coefficient, between views.
+// A coefficient, interpolated between views.
 fn half_vector_between(around: ViewsAround, i: u32) -> vec3<f32> {
     return half_vector_coefficient(around.views.x, i) * around.weights.x
         + half_vector_coefficient(around.views.y, i) * around.weights.y
@@ -32,8 +32,8 @@ fn half_vector_between(around: ViewsAround, i: u32) -> vec3<f32> {
         + half_vector_coefficient(around.views.w, i) * around.weights.w;
 }
 
-// The series for a lobe of this spread around `mu`, for an eye in direction `wo`. What rings below zero is
-// held there.
+// The series for a lobe of this spread around `mu`, for an eye in direction `wo`. Ringing below zero is
+// clamped to zero.
 fn over_half_vectors(wo: vec3<f32>, mu: vec3<f32>, spread: f32, printed: bool) -> vec3<f32> {
     let around = views_around(wo);
     var sum = vec3<f32>(0.0);

@@ -1,8 +1,7 @@
 //! An environment in spherical harmonics, and the irradiance of normals that stray.
 //!
 //! Ramamoorthi and Hanrahan 2001: Lambert's cosine is so wide that orders to 2 carry nearly all of an
-//! irradiance. Han et al. 2007, equation 25: normals of a lobe take from order l what they leave of it,
-//! `Lambda_l`.
+//! irradiance. Han et al. 2007, equation 25: a lobe of normals scales order l by `Lambda_l`.
 
 use std::f64::consts::PI;
 
@@ -60,7 +59,7 @@ impl Harmonics {
         &self.coefficients
     }
 
-    /// The sum of the series, each order times a number of its own.
+    /// Sum of the series, each order multiplied by a number of its own.
     #[must_use]
     pub fn evaluate(&self, direction: DVec3, zonal: &[f64]) -> DVec3 {
         let mut basis = vec![0.0; self.coefficients.len()];
@@ -74,26 +73,26 @@ impl Harmonics {
     }
 }
 
-/// Texels that the least irradiance is looked for in, around.
+/// Texels around, of the picture in which the least irradiance is looked for.
 const FEW_TEXELS: usize = 64;
 
-/// What normals receive of an environment.
+/// Irradiance that normals receive of an environment.
 #[derive(Clone, Debug)]
 pub struct Irradiance {
-    /// Its light, to order 2.
+    /// Light of the environment, to order 2.
     pub light: Harmonics,
-    /// The least that a normal receives of it, whatever it faces. Order 2 is off by up to 3/32 of a small
-    /// lamp, below zero too: nothing is darker than this.
+    /// Least irradiance that a normal receives, whichever way it faces. Order 2 is off by up to 3/32 of a
+    /// small lamp, and may fall below zero; no result is darker than this.
     pub least: DVec3,
 }
 
 impl Irradiance {
-    /// Of an environment.
+    /// Irradiance of an environment.
     #[must_use]
     pub fn of(environment: &Environment) -> Self {
         let beams = environment.beams(FEW_TEXELS);
         let received = |n: DVec3| beams.iter().map(|(wi, power)| *power * n.dot(*wi).max(0.0)).sum::<DVec3>();
-        // A least is the same in any order.
+        // A minimum is the same in any order.
         let least = beams.par_iter().map(|(n, _)| received(*n)).reduce(|| DVec3::INFINITY, DVec3::min);
         Self { light: Harmonics::of(environment, IRRADIANCE_ORDER), least }
     }
@@ -112,7 +111,7 @@ impl Irradiance {
     }
 }
 
-/// What a von Mises-Fisher lobe of normals leaves of orders 0, 1 and 2: `1, coth(kappa) - 1/kappa, 1 - 3
+/// Factors of a von Mises-Fisher lobe of normals at orders 0, 1 and 2: `1, coth(kappa) - 1/kappa, 1 - 3
 /// A_1/kappa`, with `variance = 1/kappa`. Their product with a lobe's own coefficients is the convolution,
 /// exactly.
 #[must_use]
@@ -143,8 +142,8 @@ mod tests {
 
     #[test]
     fn a_smooth_sky_comes_back() {
-        // Order 2, so nothing is cut off. What is left is the middles of texels: of products of order 6 at
-        // most, (6 pi/128)²/24 = 9e-4.
+        // Order 2, so nothing is cut off. The error left comes from the middles of texels: of products of
+        // order 6 at most, (6 pi/128)²/24 = 9e-4.
         let e = smooth(Size { width: 256, height: 128 });
         let harmonics = Harmonics::of(&e, 4);
         for w in [DVec3::Y, DVec3::new(0.6, -0.64, 0.48), DVec3::new(-0.8, 0.0, 0.6)] {
@@ -191,11 +190,11 @@ mod tests {
         let room = Environment::new(room).unwrap();
         let lamp = room.direction(30.5, 20.5);
         let irradiance = Irradiance::of(&room);
-        // Of sums over texels three degrees wide.
+        // Error of sums over texels three degrees wide.
         assert!((irradiance.least.x / (0.01 * PI) - 1.0).abs() < 0.01, "{}", irradiance.least);
         let (side, _) = crate::sphere::frame(lamp);
         let back = lamp * -0.4 + side * 0.84_f64.sqrt();
-        // Of the middles of texels.
+        // Error of the middles of texels.
         assert!(irradiance.light.evaluate(back, &COSINE).x.abs() < 1e-3);
         assert!(irradiance.of_normals(back, 0.0, false) == irradiance.least);
     }

@@ -1,6 +1,6 @@
 // The irradiance of normals that stray, from an environment's first nine harmonics. Twin of harmonics.rs.
 
-// What a von Mises-Fisher lobe of normals leaves of orders 1 and 2, its variance being 1/kappa.
+// Factors by which a von Mises-Fisher lobe of normals scales orders 1 and 2, its variance being 1/kappa.
 fn zonal_of_normals(variance: f32) -> vec2<f32> {
     let v = max(variance, 1e-6);
     let kappa = 1.0 / v;
@@ -16,7 +16,7 @@ fn zonal_of_normals(variance: f32) -> vec2<f32> {
 }
 
 // Irradiance of normals of this variance around a direction, in the environment's frame (Han et al. 2007,
-// equation 25). Nothing is darker than the least that a normal receives. The constants are those of the
+// equation 25). No result is darker than the least that a normal receives. The constants are those of the
 // harmonics: sqrt(1/4 pi), sqrt(3/4 pi), sqrt(15/4 pi), sqrt(5/16 pi).
 fn environment_irradiance(n: vec3<f32>, variance: f32, printed: bool) -> vec3<f32> {
     var lambda = zonal_of_normals(variance);

@@ -1,7 +1,7 @@
 //! Light from everywhere: a picture of it by latitude and longitude, and what shading makes of it.
 //!
-//! The picture is what it says, texel by texel: radiance is constant over a texel, and a texel has its exact
-//! solid angle. y is up; the middle of the picture is seen looking along -z, and x is on its right.
+//! The picture is taken literally, texel by texel: radiance is constant over a texel, and a texel has its
+//! exact solid angle. y is up; the middle of the picture is seen looking along -z, and x is on its right.
 //!
 //! [`Environment`] is the light itself, for truths. [`FilteredEnvironment`] is what shading looks up: small
 //! bright sources apart (`sun.rs`), spherical harmonics (`harmonics.rs`), cubes that are filtered wider and
@@ -35,7 +35,7 @@ pub struct Environment {
     radiance: Grid<Vec3>,
 }
 
-/// Radiance that is none.
+/// Radiance that is negative or not finite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("radiance must be finite and not below 0, which that of texel ({x}, {y}) is not")]
 pub struct BadRadiance {
@@ -117,8 +117,8 @@ impl Environment {
         (0..self.size().height).map(row).sum::<DVec3>() / (4.0 * PI)
     }
 
-    /// Light as directions, and radiance times the solid angle that it comes from: of every texel,
-    /// [`Self::reduced`] to about `width` of them around.
+    /// Light as beams: for every texel a direction, and radiance times solid angle, of the picture
+    /// [`Self::reduced`] to about `width` texels around.
     pub(super) fn beams(&self, width: usize) -> Vec<(DVec3, DVec3)> {
         let few = self.reduced(width);
         let Size { width, height } = few.size();
@@ -130,9 +130,9 @@ impl Environment {
         texels.map(beam).collect()
     }
 
-    /// The same light in fewer texels, each the mean of those it holds by solid angle: the longest side that
-    /// halving leaves at `width` or above. Of odd sides the last row or column stays alone, though it is as
-    /// wide as the others then: directions stray by a texel of the larger.
+    /// Light in fewer texels, each the mean, by solid angle, of those it covers. Sides are halved as long as
+    /// the width stays at `width` or above. Of odd sides the last row or column stays alone, but then is as
+    /// wide as the others: directions stray by a texel of the larger.
     fn reduced(&self, width: usize) -> Self {
         let mut all = self.clone();
         while all.size().width / 2 >= width {

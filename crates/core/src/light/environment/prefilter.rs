@@ -29,7 +29,7 @@ impl Microfacets {
         (2.0 * width.get()).powf(0.25).min(1.0)
     }
 
-    /// The level of a cube of so many levels that is so many times as rough as a lobe.
+    /// Level that is `times` as rough as a lobe, of a cube with so many levels.
     #[must_use]
     pub fn level(width: SlopeVariance, times: f64, levels: usize) -> f64 {
         (times * Self::roughness(width)).min(1.0) * (levels - 1) as f64

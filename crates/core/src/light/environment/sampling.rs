@@ -11,9 +11,9 @@ use crate::grid::Size;
 #[derive(Clone, Debug)]
 pub struct EnvironmentSampler {
     size: Size,
-    /// For each row, the light of all rows to its end; one more at the front, 0.
+    /// For each row, the light of all rows up to its end, with one more at the front, 0.
     rows: Vec<f64>,
-    /// For each row, the same of its texels.
+    /// For each row, the running sums of its own texels likewise.
     texels: Vec<f64>,
 }
 
@@ -69,7 +69,7 @@ impl EnvironmentSampler {
     }
 }
 
-/// The interval of a running sum that a share of it falls into, and where in it.
+/// Interval of a running sum that a share of it falls into, and the place within it.
 fn pick(sums: &[f64], share: f64) -> (usize, f64) {
     let at = share * sums[sums.len() - 1];
     let i = sums.partition_point(|sum| *sum <= at).clamp(1, sums.len() - 1) - 1;

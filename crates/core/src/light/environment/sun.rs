@@ -11,7 +11,7 @@ use glam::{DVec3, Vec3};
 use super::Environment;
 use crate::light::Light;
 
-/// How much brighter than the mean over the sphere a texel of a source is.
+/// Least brightness of a source's texel, in means over the sphere.
 const CONTRAST: f32 = 50.0;
 
 /// A source is small when its directions stray by less than this, as a root of the mean square, in radians:
@@ -21,15 +21,15 @@ const SMALL: f64 = 0.044;
 /// A source is bright when this share of all light is above the level.
 const BRIGHT: f64 = 0.002;
 
-/// Sources that are taken out, at most: the brightest.
+/// Largest number of sources that are taken out: the brightest.
 const MOST: usize = 16;
 
 /// An environment's small bright sources.
 #[derive(Clone, Debug)]
 pub struct Suns {
-    /// They as lights, in the environment's own directions.
+    /// The sources as lights, in the environment's own directions.
     pub lights: Vec<Light>,
-    /// The share of all light that is theirs.
+    /// Share of all light that comes from them.
     pub share: f64,
 }
 
@@ -122,7 +122,7 @@ mod tests {
         let Light::Directional { towards, irradiance } = suns.lights[0] else { panic!("a direction") };
         assert!((towards - e.direction(0.0, 31.0)).length() < 0.02);
         let back = rest.mean() + irradiance / (4.0 * std::f64::consts::PI);
-        // What is left is in single floats.
+        // The rest is in single floats.
         assert!((back - e.mean()).length() < 1e-6 * e.mean().length(), "{back} {}", e.mean());
         assert_eq!(rest.picture().row(70)[50], Vec3::splat(3000.0));
         assert!(suns.share > 0.0 && suns.share < 1.0);

@@ -1,0 +1,109 @@
+//! Library: what a caller asks that cannot be, and what it is told of long work.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
+
+use std::sync::Mutex;
+
+use ndfmap::core::grid::Size;
+use ndfmap::core::lookup::Lookups;
+use ndfmap::core::ndf::{AnyMethod, Slopes, Vmf};
+use ndfmap::core::observe::{Observer, Unobserved};
+use ndfmap::core::pyramid::Precision;
+use ndfmap::maps::source::{SourceMap, SourceOptions, read_source};
+use ndfmap::maps::{ChannelLayout, NdfMap, WriteOptions};
+use ndfmap::render::{Device, RenderJob, render};
+use ndfmap::report::contact_sheet;
+use ndfmap::scene::Effort;
+use ndfmap::{BakeJob, Error, SceneSpec};
+
+fn foil() -> SourceMap {
+    let options = SourceOptions { builtin_size: Size { width: 24, height: 16 }, ..SourceOptions::default() };
+    read_source("builtin:foil".as_ref(), &options).unwrap()
+}
+
+fn job<'a>(scene: &'a SceneSpec, methods: &'a [AnyMethod]) -> RenderJob<'a> {
+    RenderJob {
+        scene,
+        times: &[0.0],
+        methods,
+        size: Size { width: 24, height: 24 },
+        precision: Precision::Half,
+        lookups: Lookups::TRILINEAR,
+        truth: Some(Effort::rays(32)),
+        sparkle: true,
+        keep: false,
+    }
+}
+
+#[test]
+fn options_that_contradict_each_other_are_refused_before_the_bake() {
+    let (map, folder) = (foil(), tempfile::tempdir().unwrap());
+    let refused = |method: AnyMethod, name: &str, options: WriteOptions| {
+        let path = folder.path().join(name);
+        let error = BakeJob::new(&map, method).save(&path, &options).unwrap_err();
+        assert!(!path.exists(), "{name}");
+        error
+    };
+    let bumpslopes = WriteOptions { channels: ChannelLayout::Bumpslopes, ..WriteOptions::default() };
+    let zstd = WriteOptions { zstd: Some(3), ..WriteOptions::default() };
+    let nine = || Slopes::with_grid(9).unwrap();
+    assert!(matches!(refused(nine().into(), "a.exr", bumpslopes), Error::Request(_)));
+    assert!(matches!(refused(Slopes::new().into(), "a.ktx2", bumpslopes), Error::Request(_)));
+    assert!(matches!(refused(nine().into(), "a.exr", zstd), Error::Request(_)));
+    assert!(matches!(refused(nine().into(), "a.png", WriteOptions::default()), Error::Map(_)));
+}
+
+#[test]
+fn a_lobe_that_is_not_there_carries_nothing() {
+    let map = BakeJob::new(&foil(), Vmf::new(2).unwrap()).to_map().unwrap();
+    let texel = map.texel(1, 0, 0).unwrap();
+    assert!([0, 1, 2, 99].iter().all(|lobe| texel.attribute(0, *lobe).is_none()));
+    assert!(map.texel(99, 0, 0).is_none() && map.texel(0, 24, 0).is_none());
+    assert!(NdfMap::open("no-such-file.ktx2".as_ref()).is_err());
+}
+
+/// Observer that keeps what it is told, and stops the work after so many pieces of it.
+struct Diary {
+    pieces: Mutex<Vec<(String, Vec<f64>)>>,
+    patience: usize,
+}
+
+impl Observer for Diary {
+    fn begin(&self, work: &str) {
+        self.pieces.lock().unwrap().push((work.to_owned(), Vec::new()));
+    }
+
+    fn progress(&self, fraction: f64) {
+        self.pieces.lock().unwrap().last_mut().unwrap().1.push(fraction);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.pieces.lock().unwrap().len() > self.patience
+    }
+}
+
+#[test]
+fn every_piece_of_a_rendering_runs_forwards_to_its_end_and_can_be_stopped() {
+    let scene = SceneSpec { scene: "disk".to_owned(), ..SceneSpec::default() };
+    let methods = [Vmf::new(2).unwrap().into()];
+    let diary = |patience| Diary { pieces: Mutex::default(), patience };
+    let all = diary(usize::MAX);
+    let report = render(&job(&scene, &methods), &Device::Cpu, &all, &mut |_, _| Ok(())).unwrap();
+    let pieces = all.pieces.into_inner().unwrap();
+    let names: Vec<&str> = pieces.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["bake vmf:2", "truth", "truth, drifting", "filtered"]);
+    for (name, told) in &pieces {
+        assert!(told.is_sorted() && told.last() == Some(&1.0), "{name}: {told:?}");
+    }
+    // A report whose pictures were not kept has no contact sheet, and says so.
+    assert!(matches!(contact_sheet(&report, "disk"), Err(Error::Request(_))));
+    for patience in 0..4 {
+        let stopped = render(&job(&scene, &methods), &Device::Cpu, &diary(patience), &mut |_, _| Ok(()));
+        assert!(matches!(stopped, Err(Error::Cancelled(_))), "{patience}");
+    }
+    let nothing = RenderJob { times: &[], ..job(&scene, &methods) };
+    assert!(matches!(
+        render(&nothing, &Device::Cpu, &Unobserved, &mut |_, _| Ok(())),
+        Err(Error::Request(_))
+    ));
+}
