@@ -327,7 +327,7 @@ fn wrong_usage_is_2_and_suggests() {
     for (words, why) in [
         (vec!["bake", "builtin:foil", "-o", "a.ktx2", "-m", "toksvi"], "did you mean `toksvig`"),
         (vec!["bake", "builtin:foil", "-o", "a.ktx2", "-m", "sh:99"], "whole number from 2 to 16"),
-        (vec!["bake", "builtin:foil", "-o", "a.png"], "maps are written as .ktx2 or .exr"),
+        (vec!["bake", "builtin:foil", "-o", "a.png"], "maps are written as .exr or .ktx2"),
         (
             vec!["bake", "builtin:foil", "-o", "a.ktx2", "--layout", "bumpslopes"],
             "needs an output ending in .exr",

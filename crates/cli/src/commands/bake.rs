@@ -102,8 +102,10 @@ impl Bake {
         let limited = self.max_error.is_some() || self.bytes_per_texel.is_some();
         let wrong = if bumpslopes && (!["exr", "tx"].contains(&extension) || self.method != "slopes") {
             "the bumpslopes layout needs an output ending in .exr and `--method slopes`".to_owned()
-        } else if !bumpslopes && (extension == "tx" || to_write(&self.output).is_err()) {
-            format!("{}: maps are written as .ktx2 or .exr", self.output.display())
+        } else if let Err(unwritten) = to_write(&self.output) {
+            unwritten.to_string()
+        } else if !bumpslopes && extension == "tx" {
+            format!("{}: a .tx file holds bumpslopes: name `--layout bumpslopes`", self.output.display())
         } else if self.method == AUTO && !limited {
             "`--method auto` needs `--max-error E` or `--bytes-per-texel B`".to_owned()
         } else if self.method != AUTO && limited {
