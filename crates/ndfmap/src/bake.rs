@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use ndfmap_core::bake::{Bake, BakeReport as Baked};
 use ndfmap_core::grid::Size;
-use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::ndf::{AnyMethod, Encoding};
 use ndfmap_core::observe::{Observer, Unobserved};
 use ndfmap_core::pyramid::{Precision, level_sizes};
 use ndfmap_maps::attribute::AttributeMap;
@@ -162,7 +162,7 @@ impl<'a> BakeJob<'a> {
             (options.zstd.is_some(), options.channels == ChannelLayout::Bumpslopes);
         let exr = format.extensions.contains(&"exr");
         // Known before the minutes of baking.
-        if bumpslopes && (!exr || self.method.to_string() != "slopes") {
+        if bumpslopes && (!exr || self.method.encoding() != Encoding::SlopeMoments) {
             let why = "the bumpslopes layout needs an output ending in .exr and `--method slopes`";
             return Err(Error::Request(why.to_owned()));
         }

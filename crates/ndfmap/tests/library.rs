@@ -47,7 +47,11 @@ fn options_that_contradict_each_other_are_refused_before_the_bake() {
     let bumpslopes = WriteOptions { channels: ChannelLayout::Bumpslopes, ..WriteOptions::default() };
     let zstd = WriteOptions { zstd: Some(3), ..WriteOptions::default() };
     let nine = || Slopes::with_grid(9).unwrap();
-    assert!(matches!(refused(nine().into(), "a.exr", bumpslopes), Error::Request(_)));
+    assert!(matches!(refused(Vmf::new(2).unwrap().into(), "a.exr", bumpslopes), Error::Request(_)));
+    // What `slopes:9` stores is what `slopes` does.
+    let path = folder.path().join("nine.exr");
+    BakeJob::new(&map, nine()).save(&path, &bumpslopes).unwrap();
+    assert_eq!(NdfMap::open(&path).unwrap().header.method, "slopes:9");
     assert!(matches!(refused(Slopes::new().into(), "a.ktx2", bumpslopes), Error::Request(_)));
     assert!(matches!(refused(nine().into(), "a.exr", zstd), Error::Request(_)));
     assert!(matches!(refused(nine().into(), "a.png", WriteOptions::default()), Error::Map(_)));

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use ndfmap::choose::{Auto, Choice, Limit};
-use ndfmap::core::ndf::AnyMethod;
+use ndfmap::core::ndf::{AnyMethod, Encoding};
 use ndfmap::maps::attribute::{AttributeMap, Transfer, read_attribute};
 use ndfmap::maps::formats::to_write;
 use ndfmap::maps::source::{SourceMap, read_source};
@@ -100,7 +100,9 @@ impl Bake {
         let extension = extension.as_deref().unwrap_or_default();
         let bumpslopes = self.layout == Layout::Bumpslopes;
         let limited = self.max_error.is_some() || self.bytes_per_texel.is_some();
-        let wrong = if bumpslopes && (!["exr", "tx"].contains(&extension) || self.method != "slopes") {
+        let slopes = |method: AnyMethod| method.encoding() == Encoding::SlopeMoments;
+        let slopes = self.method.parse().is_ok_and(slopes);
+        let wrong = if bumpslopes && (!["exr", "tx"].contains(&extension) || !slopes) {
             "the bumpslopes layout needs an output ending in .exr and `--method slopes`".to_owned()
         } else if let Err(unwritten) = to_write(&self.output) {
             unwritten.to_string()

@@ -24,6 +24,9 @@ pub struct Language {
     pub summary: &'static str,
     /// Call of the library; `None` for a language without text to include, and so without a library.
     call: Option<&'static str>,
+    /// True for a language whose text is handed out as it is; naga writes the others, and wants an entry
+    /// point.
+    own_text: bool,
     /// Writes a linked library.
     write: fn(&Linked) -> Result<Vec<u8>, String>,
 }
@@ -40,31 +43,42 @@ pub static TABLE: &[Language] = &[
         name: "wgsl",
         summary: "WebGPU Shading Language: our own text, with its comments",
         call: Some(WITH_SAMPLER),
+        own_text: true,
         write: |linked| Ok(linked.text.clone().into_bytes()),
     },
     Language {
         name: "glsl",
         summary: "GLSL 4.50, to be included after `#version`",
         call: Some(COMBINED),
+        own_text: false,
         write: |linked| glsl(linked, back::glsl::Version::Desktop(450), ""),
     },
     Language {
         name: "glsl-es",
         summary: "GLSL ES 3.00 (WebGL 2), to be included after `#version`",
         call: Some(COMBINED),
+        own_text: false,
         write: |linked| glsl(linked, back::glsl::Version::new_gles(300), ES_PRECISION),
     },
     Language {
         name: "hlsl",
         summary: "HLSL, shader model 5.1 and up",
         call: Some(WITH_SAMPLER),
+        own_text: false,
         write: hlsl,
     },
-    Language { name: "msl", summary: "Metal Shading Language 2.4", call: Some(WITH_SAMPLER), write: msl },
+    Language {
+        name: "msl",
+        summary: "Metal Shading Language 2.4",
+        call: Some(WITH_SAMPLER),
+        own_text: false,
+        write: msl,
+    },
     Language {
         name: "spirv",
         summary: "SPIR-V 1.3: a fragment shader `main`, map and sampler at set 0, bindings 0 and 1",
         call: None,
+        own_text: false,
         write: spirv,
     },
 ];
@@ -86,7 +100,7 @@ impl Export<'_> {
         let library = self.library();
         // Our own text needs no entry point; naga wants one, to see which functions are used.
         let entry = include_str!("entry.wgsl");
-        let linked = if language.name == "wgsl" { check(library)? } else { check(library + "\n" + entry)? };
+        let linked = if language.own_text { check(library)? } else { check(library + "\n" + entry)? };
         let body = (language.write)(&linked)
             .map_err(|e| GpuError::Shader(format!("{} cannot say it: {e}", language.name)))?;
         let Some(call) = language.call else { return Ok(body) };

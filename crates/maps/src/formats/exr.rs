@@ -17,6 +17,7 @@ use ::exr::prelude::{
     f16, read,
 };
 use ndfmap_core::grid::Size;
+use ndfmap_core::ndf::Encoding as Channels;
 use ndfmap_core::pyramid::{Precision, Pyramid, level_sizes};
 
 use super::{ChannelLayout, Format, WriteOptions};
@@ -342,7 +343,7 @@ fn write_native(path: &Path, map: &NdfMap) -> Result<u64, MapError> {
 ///
 /// Heights change their units on the way, so a map in single precision has them rounded once.
 fn write_bumpslopes(path: &Path, map: &NdfMap, precision: Precision) -> Result<u64, MapError> {
-    if map.header.method != "slopes" {
+    if map.method(path)?.encoding() != Channels::SlopeMoments {
         let reason = format!("the bumpslopes layout holds the method `slopes`, not `{}`", map.header.method);
         return Err(MapError::unsupported(path, reason));
     }
