@@ -156,14 +156,14 @@ fn the_sampler_is_near_our_taps() {
 }
 
 #[test]
-fn colours_and_gloss_of_maps_are_drawn_too() {
+fn colours_and_roughness_of_maps_are_drawn_too() {
     let Some(device) = device() else { return };
     let (renderer, size) = (Renderer::new(&device).unwrap(), Size { width: 160, height: 160 });
     let canvas = Canvas::new(&device, size, Antialiasing::Parts).unwrap();
     let mut scene = staged("foil", 0.5, 64);
     let map = Size { width: 64, height: 64 };
     let wave = |x: usize, k: f32| 0.5 + 0.5 * (x as f32 * k).sin();
-    // Gloss as glTF has it, roughness from 0.3 to 0.95: slope variances to 0.4.
+    // As glTF has it, roughness from 0.3 to 0.95: slope variances to 0.4.
     let roughness = |x: usize, y: usize| (0.3 + 0.65 * wave(x + 2 * y, 0.5)).powi(4) / 2.0;
     let diffuse_roughness = Grid::from_fn(map, |x, y| [wave(x, 0.7), 0.3, wave(y, 0.2), roughness(x, y)]);
     let specular = Grid::from_fn(map, |x, y| [0.4, wave(x, 0.1), wave(y, 0.3), 1.0]);
