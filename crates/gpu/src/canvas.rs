@@ -130,36 +130,25 @@ impl Canvas {
         }
         device.check_size("a picture", extent)?;
         let sums = device.storage("a picture's pixels", 16 * size.area() as u64)?;
-        let texture = |size, format, samples, usage| {
-            let texture = device.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some("canvas"),
-                size,
-                mip_level_count: 1,
-                sample_count: samples,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage,
-                view_formats: &[],
-            });
-            texture.create_view(&wgpu::TextureViewDescriptor::default())
-        };
-        let TargetFormat { format, samples } = outlines.format();
+        let format = outlines.format();
+        let one_sample = |format| TargetFormat { format, samples: 1 };
+        let texture = |size, format, usage| texture(device, size, format, usage);
         let drawn = wgpu::TextureUsages::RENDER_ATTACHMENT;
         let read = wgpu::TextureUsages::TEXTURE_BINDING;
         // Targets for finding outlines have one pixel where none are looked for.
-        let one = wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 };
-        let looked = if outlines == Antialiasing::Parts { extent } else { one };
+        let one = Size { width: 1, height: 1 };
+        let looked = if outlines == Antialiasing::Parts { size } else { one };
         let stored = wgpu::TextureUsages::STORAGE_BINDING;
         Ok(Self {
             device: device.clone(),
             size,
             outlines,
-            target: texture(extent, format, samples, if samples > 1 { drawn } else { drawn | read }),
-            resolved: (samples > 1).then(|| texture(extent, format, 1, drawn | read)),
-            depth: texture(extent, DEPTH, samples, drawn),
-            places: texture(looked, PLACE, 1, drawn | read),
-            faces: texture(looked, PLACE, 1, drawn | read),
-            mask: texture(looked, wgpu::TextureFormat::R32Uint, 1, stored | read),
+            target: texture(size, format, if format.samples > 1 { drawn } else { drawn | read }),
+            resolved: (format.samples > 1).then(|| texture(size, one_sample(format.format), drawn | read)),
+            depth: texture(size, TargetFormat { format: DEPTH, ..format }, drawn),
+            places: texture(looked, one_sample(PLACE), drawn | read),
+            faces: texture(looked, one_sample(PLACE), drawn | read),
+            mask: texture(looked, one_sample(wgpu::TextureFormat::R32Uint), stored | read),
             sums,
         })
     }
@@ -189,4 +178,28 @@ impl Canvas {
         let colours = values.iter().map(|[r, g, b, _]| Vec3::new(*r, *g, *b)).collect();
         Ok(Grid::from_vec(self.size, colours).unwrap_or_else(|| unreachable!("one colour a pixel")))
     }
+}
+
+/// View of a new texture of one level and layer.
+pub(crate) fn texture(
+    device: &Device,
+    size: Size,
+    TargetFormat { format, samples }: TargetFormat,
+    usage: wgpu::TextureUsages,
+) -> wgpu::TextureView {
+    let texture = device.device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d {
+            width: size.width as u32,
+            height: size.height as u32,
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: 1,
+        sample_count: samples,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage,
+        view_formats: &[],
+    });
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
 }

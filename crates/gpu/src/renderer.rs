@@ -12,7 +12,7 @@ use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::surface::Wraps;
 use ndfmap_scene::{Camera, Material, Scene};
 
-use crate::canvas::{Antialiasing, Canvas, DEPTH, Keep, PARTS, PassTarget, Target, TargetFormat};
+use crate::canvas::{Antialiasing, Canvas, DEPTH, Keep, PARTS, PassTarget, Target, TargetFormat, texture};
 use crate::device::record_dispatch;
 use crate::environment::Environments;
 use crate::geometry::Geometry;
@@ -527,30 +527,6 @@ fn encode(
         multiview_mask: None,
     });
     draw(&mut pass);
-}
-
-/// View of a new texture of one level and layer.
-fn texture(
-    device: &Device,
-    size: Size,
-    TargetFormat { format, samples }: TargetFormat,
-    usage: wgpu::TextureUsages,
-) -> wgpu::TextureView {
-    let texture = device.device.create_texture(&wgpu::TextureDescriptor {
-        label: None,
-        size: wgpu::Extent3d {
-            width: size.width as u32,
-            height: size.height as u32,
-            depth_or_array_layers: 1,
-        },
-        mip_level_count: 1,
-        sample_count: samples,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage,
-        view_formats: &[],
-    });
-    texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
 fn bind(binding: u32, resource: wgpu::BindingResource<'_>) -> wgpu::BindGroupEntry<'_> {

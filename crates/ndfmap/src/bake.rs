@@ -4,7 +4,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use ndfmap_core::bake::{Bake, BakeReport as Baked};
-use ndfmap_core::grid::Size;
+use ndfmap_core::fit::Rgba;
+use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::ndf::{AnyMethod, Encoding};
 use ndfmap_core::observe::{Observer, Unobserved};
 use ndfmap_core::pyramid::{Precision, level_sizes};
@@ -128,6 +129,20 @@ impl<'a> BakeJob<'a> {
         }
     }
 
+    /// Values of the attributes.
+    fn values(&self) -> Vec<Grid<Rgba>> {
+        self.attributes.iter().map(|a| a.values.clone()).collect()
+    }
+
+    /// Core's bake of the map; the observer is told that it begins.
+    fn begin<'b>(&'b self, values: &'b [Grid<Rgba>]) -> Bake<'b> {
+        self.observer.begin(&self.method.to_string());
+        Bake::new(&*self.map.surface, &*self.method)
+            .precision(self.precision)
+            .attributes(values)
+            .observer(self.observer)
+    }
+
     /// Bakes into memory.
     ///
     /// # Errors
@@ -140,13 +155,8 @@ impl<'a> BakeJob<'a> {
     /// [`Self::to_map`]; errors name this file.
     fn to_map_for(&self, file: &Path) -> Result<NdfMap, Error> {
         self.check()?;
-        let values: Vec<_> = self.attributes.iter().map(|a| a.values.clone()).collect();
-        let bake = Bake::new(&*self.map.surface, &*self.method)
-            .precision(self.precision)
-            .attributes(&values)
-            .observer(self.observer);
-        self.observer.begin(&self.method.to_string());
-        let (pyramid, report) = bake.to_pyramid()?;
+        let values = self.values();
+        let (pyramid, report) = self.begin(&values).to_pyramid()?;
         refuse_overflow(report, file)?;
         Ok(NdfMap { header: self.header(), pyramid })
     }
@@ -174,13 +184,9 @@ impl<'a> BakeJob<'a> {
         let (bytes, baked) = match format.open_sink.filter(|_| plain) {
             // Rows go straight into the file, so writing counts as baking; only the rename remains.
             Some(open) => {
-                let values: Vec<_> = self.attributes.iter().map(|a| a.values.clone()).collect();
-                let bake = Bake::new(&*self.map.surface, &*self.method)
-                    .precision(self.precision)
-                    .attributes(&values)
-                    .observer(self.observer);
+                let values = self.values();
+                let bake = self.begin(&values);
                 let mut sink = open(path, &self.header(), bake.layout())?;
-                self.observer.begin(&self.method.to_string());
                 let report = bake.run(&mut sink)?;
                 refuse_overflow(report, path)?;
                 let baked = start.elapsed().as_secs_f64();
