@@ -10,6 +10,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use crate::grid::{Grid, Size};
+use crate::words;
 
 /// Wrap of a map on one axis: how it goes on beyond its edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -20,6 +21,8 @@ pub enum Wrap {
     /// The edge texel goes on for ever.
     Clamp,
 }
+
+words!(Wrap { Repeat => "repeat", Clamp => "clamp" });
 
 impl Wrap {
     /// The texel that stands for coordinate `i`, which may lie outside `0..n`.

@@ -74,10 +74,7 @@ impl Header {
     /// Spells [`Wraps`].
     #[must_use]
     pub fn spell_wraps(wraps: Wraps) -> [String; 2] {
-        [wraps.x, wraps.y].map(|w| match w {
-            Wrap::Repeat => "repeat".to_owned(),
-            Wrap::Clamp => "clamp".to_owned(),
-        })
+        [wraps.x, wraps.y].map(|wrap| wrap.to_string())
     }
 
     /// [`Wraps`] that the header spells.
@@ -85,10 +82,9 @@ impl Header {
     /// # Errors
     /// [`MapError`] for any other word.
     pub fn wraps(&self, path: &Path) -> Result<Wraps, MapError> {
-        let wrap = |word: &str| match word {
-            "repeat" => Ok(Wrap::Repeat),
-            "clamp" => Ok(Wrap::Clamp),
-            other => Err(MapError::invalid(path, format!("its header has the unknown wrap `{other}`"))),
+        let wrap = |word: &str| {
+            let unknown = |_| MapError::invalid(path, format!("its header has the unknown wrap `{word}`"));
+            word.parse::<Wrap>().map_err(unknown)
         };
         Ok(Wraps { x: wrap(&self.wrap[0])?, y: wrap(&self.wrap[1])? })
     }

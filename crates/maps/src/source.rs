@@ -12,6 +12,8 @@ use ndfmap_core::surface::{
 };
 use sha2::{Digest, Sha256};
 
+use ndfmap_core::words;
+
 use crate::formats::{read_file, read_image};
 use crate::header::{Source, SourceKind};
 use crate::{Image, MapError, Samples};
@@ -26,16 +28,7 @@ pub enum Convention {
     DirectX,
 }
 
-impl Convention {
-    /// Spelling on the command line and in headers.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::OpenGl => "opengl",
-            Self::DirectX => "directx",
-        }
-    }
-}
+words!(Convention { OpenGl => "opengl", DirectX => "directx" });
 
 /// Options for reading a picture as a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,7 @@
 //! Tone mapping: from light of any brightness to a screen's range, before the screen's own curve.
 
 use glam::Vec3;
+use ndfmap_core::words;
 
 /// Tone mapping, which brings light into a screen's range.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,19 +19,9 @@ pub const WHITE: f32 = 4.0;
 /// Luminance of linear RGB (ITU-R BT.709).
 const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 
+words!(Tone { Clip => "clip", Reinhard => "reinhard" });
+
 impl Tone {
-    /// Every tone mapping.
-    pub const ALL: [Self; 2] = [Self::Clip, Self::Reinhard];
-
-    /// Name on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Clip => "clip",
-            Self::Reinhard => "reinhard",
-        }
-    }
-
     /// Colour to show for one that is exposed already; hue and saturation stay.
     #[must_use]
     pub fn map(self, colour: Vec3) -> Vec3 {

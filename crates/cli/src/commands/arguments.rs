@@ -1,9 +1,10 @@
 //! Arguments that several commands take, and their parsers.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
-use ndfmap::core::brdf::{self, AnyLobe, LobeFactors, ParseLobeError, ShadingModel};
+use ndfmap::core::brdf::{self, AnyLobe, LobeFactors, ParseLobeError};
 use ndfmap::core::grid::Size;
 use ndfmap::core::light::environment::{SceneEnvironment, Technique, builtin};
 use ndfmap::core::ndf::{self, AnyMethod, ParseMethodError};
@@ -125,7 +126,7 @@ pub(super) struct EnvironmentArguments {
     turn: Option<[f64; 2]>,
     /// How highlights look the environment up: cubes that microfacets have blurred (prefiltered), or Han et
     /// al.'s series over half-vectors (harmonics)
-    #[arg(long, value_name = "HOW", default_value = "prefiltered", value_parser = technique, requires = "environment")]
+    #[arg(long, value_name = "HOW", default_value = "prefiltered", value_parser = Technique::from_str, requires = "environment")]
     environment_light: Technique,
 }
 
@@ -178,14 +179,6 @@ fn turn(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
-fn technique(text: &str) -> Result<Technique, String> {
-    let names = Technique::ALL.map(Technique::name).join(", ");
-    Technique::ALL
-        .into_iter()
-        .find(|t| t.name() == text)
-        .ok_or_else(|| format!("`{text}` is none of {names}"))
-}
-
 /// List of every built-in environment, for `--help`.
 pub(super) fn environments_help() -> String {
     let rows = builtin::TABLE.iter().map(|r| format!("  {:12} {}", r.name, r.summary));
@@ -200,11 +193,8 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
 }
 
 fn wraps(text: &str) -> Result<Wraps, String> {
-    let wrap = |word: &str| match word {
-        "repeat" => Ok(Wrap::Repeat),
-        "clamp" => Ok(Wrap::Clamp),
-        other => Err(format!("`{other}` is neither `repeat` nor `clamp`")),
-    };
+    let wrap =
+        |word: &str| word.parse::<Wrap>().map_err(|_| format!("`{word}` is neither `repeat` nor `clamp`"));
     match text.split(',').collect::<Vec<_>>()[..] {
         [both] => Ok(Wraps { x: wrap(both)?, y: wrap(both)? }),
         [x, y] => Ok(Wraps { x: wrap(x)?, y: wrap(y)? }),
@@ -323,13 +313,4 @@ pub(super) fn brdfs_help() -> String {
     let rows = brdf::TABLE.iter().map(|r| format!("  {}{}\n      {}", r.name, r.parameter, r.summary));
     let merl = "  merl:FILE\n      a file of measurements in the MERL format (.binary), factored, in its own colours".to_owned();
     format!("BRDFs:\n{}", rows.chain([merl]).collect::<Vec<_>>().join("\n"))
-}
-
-/// Reads the name of a shading model.
-pub(super) fn model(text: &str) -> Result<ShadingModel, String> {
-    let names = ShadingModel::ALL.map(ShadingModel::name).join(", ");
-    ShadingModel::ALL
-        .into_iter()
-        .find(|m| m.name() == text)
-        .ok_or_else(|| format!("`{text}` is none of {names}"))
 }

@@ -1,6 +1,7 @@
 //! `ndfmap render`: pictures of a scene, through baked maps and by brute force, and their differences.
 
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
@@ -24,7 +25,7 @@ use serde_json::{Map, Value, json};
 
 use super::arguments::{
     EnvironmentArguments, Precision, SourceArguments, brdf_spelling, brdfs_help, environments_help,
-    method_spelling, methods_help, model, positive, read_brdf, scene_name, size,
+    method_spelling, methods_help, positive, read_brdf, scene_name, size,
 };
 use super::{print, print_json, say_if_replaced, to_value, warn};
 use crate::tables;
@@ -84,7 +85,7 @@ pub(super) struct Render {
     brdf: Option<String>,
     /// What goes with the lobe: the factor of Tan et al., of Han et al. or of Smith (tan, han, smith);
     /// or what displaced surfaces have (masked, shadowed)
-    #[arg(long, value_parser = model, conflicts_with = "displace")]
+    #[arg(long, value_parser = ShadingModel::from_str, conflicts_with = "displace")]
     model: Option<ShadingModel>,
     #[command(flatten)]
     displace: DisplaceArguments,
@@ -103,7 +104,7 @@ pub(super) struct Render {
     exposure: Option<f64>,
     /// How highlights are brought into the range of the PNG that `-o` writes: cut off (clip), or compressed
     /// (reinhard)
-    #[arg(long, default_value = "clip", value_parser = tone)]
+    #[arg(long, default_value = "clip", value_parser = Tone::from_str)]
     tone: Tone,
     /// What renders
     #[arg(long, value_enum, default_value_t = Device::Auto)]
@@ -213,11 +214,6 @@ fn scenes_help() -> String {
     let rows =
         scene::TABLE.iter().map(|r| format!("  {:13} {}; over time, {}", r.name, r.summary, r.animation));
     format!("Scenes:\n{}", rows.collect::<Vec<_>>().join("\n"))
-}
-
-fn tone(text: &str) -> Result<Tone, String> {
-    let names = Tone::ALL.map(Tone::name).join(", ");
-    Tone::ALL.into_iter().find(|t| t.name() == text).ok_or_else(|| format!("`{text}` is none of {names}"))
 }
 
 fn time(text: &str) -> Result<f64, String> {

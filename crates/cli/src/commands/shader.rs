@@ -1,6 +1,7 @@
 //! `ndfmap shader`: decoding and shading of one method, in the language of another program.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::Args;
 use ndfmap::core::brdf::{Brdf, ShadingModel};
@@ -8,7 +9,7 @@ use ndfmap::core::ndf::AnyMethod;
 use ndfmap::gpu::export::{Export, Language, TABLE};
 use serde_json::json;
 
-use super::arguments::{brdf_spelling, brdfs_help, method_spelling, methods_help, model, read_brdf};
+use super::arguments::{brdf_spelling, brdfs_help, method_spelling, methods_help, read_brdf};
 use super::{print_bytes, print_json, say_if_replaced};
 use ndfmap::Error;
 
@@ -23,7 +24,7 @@ pub(super) struct Shader {
     #[arg(long, default_value = "ggx:0.2", value_parser = brdf_spelling)]
     brdf: String,
     /// What goes with the lobe: the factor of Tan et al., of Han et al. or of Smith (tan, han, smith)
-    #[arg(long, default_value = "smith", value_parser = model)]
+    #[arg(long, default_value = "smith", value_parser = ShadingModel::from_str)]
     model: ShadingModel,
     /// The language
     #[arg(short, long, default_value = "wgsl", value_parser = language)]

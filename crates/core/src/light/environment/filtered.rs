@@ -7,6 +7,7 @@ use glam::DMat3;
 use super::{Cube, Environment, HalfVectors, Irradiance, Suns, without_suns};
 use crate::brdf::Microfacets;
 use crate::light::Light;
+use crate::words;
 
 /// Technique by which lobes of normals reflect an environment in highlights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,19 +20,9 @@ pub enum Technique {
     Harmonics,
 }
 
+words!(Technique { Prefiltered => "prefiltered", Harmonics => "harmonics" });
+
 impl Technique {
-    /// Every technique.
-    pub const ALL: [Self; 2] = [Self::Prefiltered, Self::Harmonics];
-
-    /// Spelling on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Prefiltered => "prefiltered",
-            Self::Harmonics => "harmonics",
-        }
-    }
-
     /// Number of the technique in shaders.
     #[must_use]
     pub fn index(self) -> u32 {
