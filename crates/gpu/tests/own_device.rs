@@ -1,4 +1,4 @@
-//! What another program does: its own device, its own commands, its own texture, and our maps drawn on it.
+//! Another program: its own device, its own commands, its own texture, and our maps drawn on it.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
 

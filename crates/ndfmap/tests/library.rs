@@ -4,13 +4,14 @@
 
 use std::sync::Mutex;
 
-use ndfmap::core::grid::Size;
+use ndfmap::core::grid::{Grid, Size};
 use ndfmap::core::lookup::Lookups;
 use ndfmap::core::ndf::{AnyMethod, Slopes, Vmf};
 use ndfmap::core::observe::{Observer, Unobserved};
 use ndfmap::core::pyramid::Precision;
+use ndfmap::maps::attribute::AttributeMap;
 use ndfmap::maps::source::{SourceMap, SourceOptions, read_source};
-use ndfmap::maps::{ChannelLayout, NdfMap, WriteOptions};
+use ndfmap::maps::{Attribute, ChannelLayout, NdfMap, WriteOptions};
 use ndfmap::render::{Device, RenderJob, render};
 use ndfmap::report::contact_sheet;
 use ndfmap::scene::Effort;
@@ -59,9 +60,24 @@ fn options_that_contradict_each_other_are_refused_before_the_bake() {
 
 #[test]
 fn a_lobe_that_is_not_there_carries_nothing() {
-    let map = BakeJob::new(&foil(), Vmf::new(2).unwrap()).to_map().unwrap();
+    let attribute = |name: &str, value: f32| AttributeMap {
+        attribute: Attribute { name: name.to_owned(), channels: 1, transfer: "linear".to_owned() },
+        values: Grid::from_fn(Size { width: 24, height: 16 }, |_, _| [value, 0.0, 0.0, 1.0]),
+    };
+    let attributes = [attribute("a", 0.25), attribute("b", 0.75)];
+    let foil = foil();
+    let map = BakeJob::new(&foil, Vmf::new(2).unwrap()).attributes(&attributes).to_map().unwrap();
     let texel = map.texel(1, 0, 0).unwrap();
-    assert!([0, 1, 2, 99].iter().all(|lobe| texel.attribute(0, *lobe).is_none()));
+    for (number, value) in [(0, 0.25), (1, 0.75)] {
+        for lobe in texel.decoded().lobes() {
+            // Stored times the lobe's weight, both in half floats of eleven bits.
+            let carried = texel.attribute(number, lobe.index).unwrap()[0];
+            assert!((carried - value).abs() < value / 512.0, "{carried} for {value}");
+        }
+        // Past the last lobe lie the layers of the next attribute.
+        assert!([2, 3, 99].iter().all(|lobe| texel.attribute(number, *lobe).is_none()));
+    }
+    assert!(texel.attribute(2, 0).is_none());
     assert!(map.texel(99, 0, 0).is_none() && map.texel(0, 24, 0).is_none());
     assert!(NdfMap::open("no-such-file.ktx2".as_ref()).is_err());
 }
