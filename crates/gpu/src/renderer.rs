@@ -116,8 +116,8 @@ impl Renderer {
         })
     }
 
-    /// Records a frame, one sample of shading a pixel, into the caller's commands, which the caller
-    /// submits. Nothing is waited for; textures that the frame is the first to need are uploaded by the queue.
+    /// Records a frame, one sample of shading a pixel, into the caller's commands, which the caller submits.
+    /// Nothing is waited for; textures that the frame is the first to need are uploaded by the queue.
     ///
     /// The frame shows the scene as it is now. Materials whose BRDF, colours and environment are those of the
     /// last frame cost the processor nothing but the comparison.
