@@ -58,15 +58,15 @@ fn taps(pixel: PixelFootprint, texels: vec2<f32>, filtering: Filtering) -> Taps 
     let larger = sqrt((1.0 + abs(double_angle.x)) / 2.0);
     let smaller = double_angle.y / (2.0 * larger);
     let axis = select(vec2<f32>(smaller, larger), vec2<f32>(larger, smaller), double_angle.x >= 0.0);
-    let parts = f32(max(filtering.parts, 1u));
+    let rows = max(filtering.parts, 1u);
     // A hundredth over is no reason for another tap: else a round pixel would have one or two by its last
     // digit.
     let wanted = min(ceil(major / max(minor, 1.0) - 0.01), 1e6);
-    let long = clamp(wanted, 1.0, f32(max(filtering.max_taps, 1u))) * parts;
-    let lod = log2(max(max(major / long, minor / parts), 1.0)) + filtering.lod_bias;
+    let columns = u32(clamp(wanted, 1.0, f32(max(filtering.max_taps, 1u)))) * rows;
+    let lod = log2(max(max(major / f32(columns), minor / f32(rows)), 1.0)) + filtering.lod_bias;
     let along = axis * major / texels;
     let across = vec2<f32>(-axis.y, axis.x) * minor / texels;
-    return Taps(pixel.uv, along, across, clamp(lod, 0.0, f32(filtering.levels - 1u)), u32(long), u32(parts));
+    return Taps(pixel.uv, along, across, clamp(lod, 0.0, f32(filtering.levels - 1u)), columns, rows);
 }
 
 // Place of tap i.
@@ -100,7 +100,7 @@ fn pair(t: f32, n: u32, repeat: bool) -> Pair {
     let low = floor(at);
     // Whole turns are taken off in floats, so that no place is too far away for whole numbers.
     let turns = select(0.0, floor(low / f32(n)), repeat);
-    let first = i32(clamp(low - turns * f32(n), -1.0, f32(n)));
+    let first = i32(clamp(round(low - turns * f32(n)), -1.0, f32(n)));
     if repeat {
         return Pair((first + count) % count, (first + 1 + count) % count, at - low);
     }

@@ -23,14 +23,15 @@ fn mean_of_positive_part(mean: f32, variance: f32) -> f32 {
     return mean * 0.5 * erfc(-t / sqrt(2.0)) + s * density;
 }
 
-// A_1 = coth kappa - 1/kappa: where the two are near each other, by its series, to 2e-9 at one half. Beyond
-// 20, coth is 1.
+// A_1 = coth kappa - 1/kappa: where the two are near each other, by its series, to 2e-9 at one half. (By
+// `exp`: nothing bounds what devices make of `tanh`.)
 fn mean_cosine(kappa: f32) -> f32 {
     let k2 = kappa * kappa;
     if kappa < 0.5 {
         return kappa * (1.0 / 3.0 - k2 * (1.0 / 45.0 - k2 * (2.0 / 945.0 - k2 * (1.0 / 4725.0 - k2 * 2.0 / 93555.0))));
     }
-    return 1.0 / tanh(min(kappa, 20.0)) - 1.0 / kappa;
+    let e = exp(-2.0 * kappa);
+    return (1.0 + e) / (1.0 - e) - 1.0 / kappa;
 }
 
 // Lambert's cosine u, averaged over a vMF lobe of normals of variance `v` around the normal that u belongs

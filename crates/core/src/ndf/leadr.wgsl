@@ -67,6 +67,19 @@ fn slope_hash(v: u32) -> u32 {
     return (word >> 22u) ^ word;
 }
 
+// Point of the unit circle after `turns` from its first axis: the sine and the cosine of the angle to the
+// nearest axis by their series, to 2e-9, as devices' own may be off by 2^-11.
+fn circle_point(turns: f32) -> vec2<f32> {
+    let quarter = round(4.0 * turns);
+    let a = 0.5 * PI * (4.0 * turns - quarter);
+    let a2 = a * a;
+    let s = a * (1.0 - a2 / 6.0 * (1.0 - a2 / 20.0 * (1.0 - a2 / 42.0 * (1.0 - a2 / 72.0))));
+    let c = 1.0 - a2 / 2.0 * (1.0 - a2 / 12.0 * (1.0 - a2 / 30.0 * (1.0 - a2 / 56.0 * (1.0 - a2 / 90.0))));
+    let odd = (u32(quarter) & 1u) == 1u;
+    let point = select(vec2<f32>(c, s), vec2<f32>(-s, c), odd);
+    return select(point, -point, (u32(quarter) & 2u) == 2u);
+}
+
 // A slope of the grid: its place in deviations, its weight (all of them add up to one), and the side of the
 // square that it stands for.
 fn slope_point(i: u32) -> vec4<f32> {
@@ -75,7 +88,7 @@ fn slope_point(i: u32) -> vec4<f32> {
         let v = (f32(slope_hash(2u * i + 1u) >> 8u) + 0.5) / 16777216.0;
         let radius = sqrt(-2.0 * log(u));
         let share = 1.0 / f32(GRID * GRID);
-        return vec4<f32>(radius * cos(2.0 * PI * v), radius * sin(2.0 * PI * v), share, sqrt(2.0 * PI / u * share));
+        return vec4<f32>(radius * circle_point(v), share, sqrt(2.0 * PI / u * share));
     }
     let at = GRID_STEP * (vec2<f32>(f32(i / GRID), f32(i % GRID)) - 0.5 * f32(GRID - 1u));
     return vec4<f32>(at, GRID_WEIGHT * exp(-0.5 * dot(at, at)), GRID_STEP);
