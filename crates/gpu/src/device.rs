@@ -12,6 +12,8 @@ pub struct Device {
     name: String,
     backend: wgpu::Backend,
     software: bool,
+    /// Rewriting of each shader's text, before the driver sees it.
+    rewrite: fn(&str) -> String,
     /// The first thing that went wrong outside of any call.
     failure: Arc<Mutex<Option<GpuError>>>,
 }
@@ -66,7 +68,21 @@ impl Device {
     pub fn from_wgpu(device: wgpu::Device, queue: wgpu::Queue) -> Self {
         let info = device.adapter_info();
         let software = info.device_type == wgpu::DeviceType::Cpu;
-        Self { device, queue, name: info.name, backend: info.backend, software, failure: Arc::default() }
+        let (name, rewrite) = (info.name, str::to_owned);
+        Self { device, queue, name, backend: info.backend, software, rewrite, failure: Arc::default() }
+    }
+
+    /// The same device with every shader of ours rewritten: tests make it less exact than it is.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn rewriting_shaders(self, rewrite: fn(&str) -> String) -> Self {
+        Self { rewrite, ..self }
+    }
+
+    /// Shader from its text.
+    pub(crate) fn shader(&self, label: Option<&str>, text: &str) -> wgpu::ShaderModule {
+        let source = wgpu::ShaderSource::Wgsl((self.rewrite)(text).into());
+        self.device.create_shader_module(wgpu::ShaderModuleDescriptor { label, source })
     }
 
     /// Device and queue of wgpu.
@@ -199,10 +215,7 @@ impl Device {
     /// Pipeline of a shader's entry point `main`, which may count invocations by ROW.
     pub(crate) fn compute_pipeline(&self, shader: &str) -> wgpu::ComputePipeline {
         let shader = format!("const ROW: u32 = {}u;\n{shader}", 64 * GROUPS_IN_A_ROW);
-        let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: None,
-            source: wgpu::ShaderSource::Wgsl(shader.into()),
-        });
+        let module = self.shader(None, &shader);
         self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: None,
             layout: None,

@@ -166,10 +166,7 @@ struct PipelineDescriptor<'a> {
 }
 
 fn build(device: &Device, plan: &PipelineDescriptor<'_>) -> wgpu::RenderPipeline {
-    let module = device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some(plan.entry),
-        source: wgpu::ShaderSource::Wgsl(plan.text.into()),
-    });
+    let module = device.shader(Some(plan.entry), plan.text);
     let groups: Vec<Option<&wgpu::BindGroupLayout>> = plan.groups.iter().map(|g| Some(*g)).collect();
     let layout = device.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: None,

@@ -45,7 +45,7 @@ fn all(language: &str) -> Vec<(String, Vec<u8>)> {
     shaders
 }
 
-/// What an engine would write around an included library.
+/// Shader that an engine would write around an included library.
 const GLSL_MAIN: &str = "
 uniform sampler2DArray map;
 in vec2 uv;

@@ -1,23 +1,23 @@
 //! The twins agree: every method's decoding and shading, and every lobe's functions, on the GPU and on the
 //! CPU.
 //!
-//! An output may differ by 1e-5 of itself (the issue of single floats: a chain of some tens of roundings of
-//! 6e-8, and `exp` and `pow`, which devices are allowed 2e-6 for), and by what the exact function would
-//! change if its inputs moved by a few of their own last digits (`INPUT_STEP`). The second is no slack of
-//! ours: where a function multiplies such a step, no arithmetic in single floats can do without, as in `1 -
-//! |r|²` of a narrow lobe.
+//! An output may differ by 1e-5 of itself (a chain of some tens of operations in single floats, of one to
+//! eight units of 1.2e-7 each), and where it magnifies such errors by what inexact devices make of it, as far
+//! as the standard allows them to be off: see `inexact/mod.rs`.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
 
 mod common;
+mod inexact;
 
 use common::device;
 use glam::{DVec3, Mat2, Vec3};
+use inexact::inexact;
 use ndfmap_core::bake::Bake;
 use ndfmap_core::brdf::{AnyLobe, Brdf, Directions, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::Size;
 use ndfmap_core::lookup::Lookup;
-use ndfmap_core::ndf::{self, AnyMethod, FilteredTexel, IncidentLight, Method};
+use ndfmap_core::ndf::{self, AnyMethod, FilteredTexel, FormKind, IncidentLight, Method};
 use ndfmap_core::units::SlopeVariance;
 use ndfmap_core::{brdf, procedural, shader};
 use ndfmap_gpu::Device;
@@ -27,8 +27,17 @@ use rand_pcg::Pcg64Mcg;
 /// Relative error allowed.
 const RELATIVE: f64 = 1e-5;
 
-/// Steps that inputs are moved by, of the largest in their vector: four units in the last place.
-const INPUT_STEP: f32 = 4.8e-7;
+/// Inexact devices that are tried.
+const DEVICES: u64 = 3;
+
+/// Times that the inputs are jolted on each of them, by one unit: where two large errors cancel on one device
+/// by chance, or a branch is near, they do not in all.
+const JOLTS: usize = 3;
+
+/// Changes on the inexact devices that a sound device may be off by. Tosses of coins add up to the root of
+/// the number of errors, and the worst device to their number. Of 14 million outputs of four more inexact
+/// devices, 226 were off by more, though their every operation errs by all it may.
+const SPREADS: f64 = 4.0;
 
 /// One evaluation: a material, a way, a texel.
 #[derive(Clone, Debug)]
@@ -40,10 +49,22 @@ struct Probe {
     normal: Vec3,
     at_means: bool,
     channels: Vec<f32>,
-    /// How slopes lie on the displaced surface.
+    /// Map of slopes from the texel to the displaced surface.
     by: Mat2,
     /// Its base turns its back on the eye.
     below: bool,
+}
+
+impl Probe {
+    /// The same with its numbers moved by one unit in the last place, up or down.
+    fn jolted(&self, random: &mut Pcg64Mcg) -> Self {
+        let mut factor = || if random.random() { 1.0 + f32::EPSILON } else { 1.0 - f32::EPSILON };
+        let mut moved = |v: Vec3| v * Vec3::from_array(std::array::from_fn(|_| factor()));
+        let (wi, wo, normal) = (moved(self.wi), moved(self.wo), moved(self.normal));
+        let channels = self.channels.iter().map(|c| c * factor()).collect();
+        let by = Mat2::from_cols_array(&self.by.to_cols_array().map(|c| c * factor()));
+        Self { wi, wo, normal, channels, by, ..self.clone() }
+    }
 }
 
 fn unit(v: DVec3) -> Vec3 {
@@ -95,14 +116,14 @@ fn probes(method: &dyn Method, count: usize) -> Vec<Probe> {
     (0..count).map(probe).collect()
 }
 
-/// What both are asked, with the same numbers.
+/// Question that both are asked, with the same numbers.
 struct Question<'a> {
     method: &'a dyn Method,
     brdf: &'a Brdf,
 }
 
 impl Question<'_> {
-    /// The inputs as the shader takes them; the second result says which may be moved, and by how much.
+    /// Appends the inputs as the shader takes them.
     fn pack(&self, probe: &Probe, out: &mut Vec<f32>) {
         let table = self.method.shader_table(self.brdf, probe.params.roughness, probe.params.roughness);
         let SurfaceParams { diffuse, specular, roughness } = probe.params;
@@ -117,6 +138,24 @@ impl Question<'_> {
         out.extend(probe.by.to_cols_array());
         out.extend(table.as_flat());
         out.extend(&probe.channels);
+    }
+
+    /// Outputs of a device for all probes.
+    fn outputs(&self, device: &Device, shader: &str, probes: &[Probe]) -> Vec<[f32; OUTPUTS]> {
+        let mut input = Vec::new();
+        probes.iter().for_each(|probe| self.pack(probe, &mut input));
+        let (bytes, count) = (size_of::<[f32; OUTPUTS]>() * probes.len(), probes.len() as u32);
+        let output = device.compute(shader, bytemuck::cast_slice(&input), bytes as u64, count);
+        bytemuck::pod_collect_to_vec(&output.unwrap_or_else(|e| panic!("{e}")))
+    }
+
+    /// Outputs of the inexact device of this number, for the probes and for jolted ones, one set after
+    /// another.
+    fn jolted(&self, device: &Device, shader: &str, probes: &[Probe], number: u64) -> Vec<[f32; OUTPUTS]> {
+        let mut random = Pcg64Mcg::seed_from_u64(number);
+        let jolted = (0..JOLTS * probes.len()).map(|i| probes[i % probes.len()].jolted(&mut random));
+        let all: Vec<_> = probes.iter().cloned().chain(jolted).collect();
+        self.outputs(device, &inexact(shader, number), &all)
     }
 
     /// -1 where the base of the displaced surface turns its back on the eye, as only methods that know of
@@ -171,40 +210,6 @@ impl Question<'_> {
             visible,
         ]
     }
-
-    /// What the answer may be off by.
-    fn allowed(&self, probe: &Probe, answer: &[f64; OUTPUTS]) -> [f64; OUTPUTS] {
-        let mut allowed = answer.map(|a| RELATIVE * a.abs() + 1e-30);
-        let mut moved = |other: Probe| {
-            let changed = self.answer(&other);
-            for ((allowed, a), b) in allowed.iter_mut().zip(answer).zip(changed) {
-                *allowed += (a - b).abs();
-            }
-        };
-        for k in 0..4 {
-            let mut by = probe.by.to_cols_array();
-            by[k] *= 1.0 + INPUT_STEP;
-            moved(Probe { by: Mat2::from_cols_array(&by), ..probe.clone() });
-        }
-        for axis in Vec3::AXES {
-            moved(Probe { wi: probe.wi + axis * INPUT_STEP, ..probe.clone() });
-            moved(Probe { normal: probe.normal + axis * INPUT_STEP, ..probe.clone() });
-            moved(Probe { wo: probe.wo + axis * INPUT_STEP, ..probe.clone() });
-        }
-        for (layer, four) in probe.channels.as_chunks::<4>().0.iter().enumerate() {
-            let largest = four.iter().fold(0.0_f32, |m, c| m.max(c.abs()));
-            for k in 0..4 {
-                let mut other = probe.clone();
-                other.channels[4 * layer + k] += INPUT_STEP * largest;
-                moved(other);
-            }
-        }
-        let specular = probe.params.specular * (1.0 - f64::from(INPUT_STEP));
-        moved(Probe { params: SurfaceParams { specular, ..probe.params }, ..probe.clone() });
-        let roughness = SlopeVariance::clamped(probe.params.roughness.get() * (1.0 + f64::from(INPUT_STEP)));
-        moved(Probe { params: SurfaceParams { roughness, ..probe.params }, ..probe.clone() });
-        allowed
-    }
 }
 
 /// The outputs, in order, for messages.
@@ -223,64 +228,69 @@ const NAMES: [&str; OUTPUTS] = [
     "visible area",
 ];
 
-/// How many there are.
+/// Number of outputs.
 const OUTPUTS: usize = 12;
 
-/// Compares; returns the share of outputs within [`RELATIVE`] without the second allowance.
-fn compare(device: &Device, question: &Question<'_>, probes: &[Probe]) -> f64 {
+/// Compares, and prints the share of outputs within [`RELATIVE`] alone and how much of its bound the worst
+/// takes.
+fn compare(device: &Device, question: &Question<'_>, probes: &[Probe]) {
     let name =
         format!("{} with {} and {}", question.method, question.brdf.lobe, question.brdf.shading.name());
     let text = shader::link(question.method, &*question.brdf.lobe, 0) + include_str!("parity.wgsl");
-    let mut input = Vec::new();
-    probes.iter().for_each(|p| question.pack(p, &mut input));
-    let count = probes.len() as u32;
-    let output = device.compute(&text, bytemuck::cast_slice(&input), 48 * u64::from(count), count);
-    let output = output.unwrap_or_else(|e| panic!("{name}: {e}"));
-    let output: Vec<f32> = bytemuck::pod_collect_to_vec(&output);
-    let (mut within, mut all) = (0, 0);
-    for (i, (probe, got)) in probes.iter().zip(output.as_chunks::<OUTPUTS>().0).enumerate() {
+    let exact = question.outputs(device, &text, probes);
+    let inexact: Vec<_> = (0..DEVICES).map(|number| question.jolted(device, &text, probes, number)).collect();
+    let (mut within, mut worst) = (0, 0.0_f64);
+    for (i, (probe, got)) in probes.iter().zip(&exact).enumerate() {
         let answer = question.answer(probe);
-        let plain = |k: usize| (f64::from(got[k]) - answer[k]).abs() <= RELATIVE * answer[k].abs() + 1e-30;
-        all += OUTPUTS;
-        let exact = (0..OUTPUTS).filter(|k| plain(*k)).count();
-        within += exact;
-        if exact == OUTPUTS {
-            continue;
-        }
-        let allowed = question.allowed(probe, &answer);
         for k in 0..OUTPUTS {
             let error = (f64::from(got[k]) - answer[k]).abs();
+            let plain = RELATIVE * answer[k].abs() + 1e-30;
+            within += usize::from(error <= plain);
+            let sets = inexact.iter().flat_map(|all| all.iter().skip(i).step_by(probes.len()));
+            let spread = sets.fold(0.0, |most: f64, other| most.max((other[k] - got[k]).abs().into()));
+            let allowed = plain + SPREADS * spread;
+            worst = worst.max(error / allowed);
             assert!(
-                error <= allowed[k],
-                "{name}, probe {i}, {}: {} for {}, off by {error:e}, allowed {:e}\n{probe:?} way {:?} lobe {:e}",
+                error <= allowed,
+                "{name}, probe {i}, {}: {} for {}, off by {error:e}, allowed {allowed:e}\n{probe:?}",
                 NAMES[k],
                 got[k],
                 answer[k],
-                allowed[k],
-                Directions::new(probe.wi.as_dvec3(), probe.wo.as_dvec3()),
-                answer[4]
             );
         }
     }
-    f64::from(within as u32) / f64::from(all as u32)
+    let share = 100.0 * within as f64 / (OUTPUTS * probes.len()) as f64;
+    eprintln!("{name}: {share:.2} % within 1e-5, {worst:.2} of the bound at worst");
 }
 
 fn brdf(lobe: &str, shading: ShadingModel) -> Brdf {
     Brdf { lobe: lobe.parse::<AnyLobe>().unwrap(), shading }
 }
 
-#[test]
-fn every_method_agrees() {
+/// Compares the methods of one form.
+fn methods_agree(form: impl Fn(FormKind) -> bool) {
     let Some(device) = device() else { return };
     for (at, spelling) in ndf::TABLE.iter().flat_map(|row| row.samples).enumerate() {
         let method = spelling.parse::<AnyMethod>().unwrap();
+        if !form(method.form_kind()) {
+            continue;
+        }
         let probes = probes(&*method, 500);
         for (k, lobe) in ["blinn-phong:50", "ggx:0.2"].into_iter().enumerate() {
             let brdf = brdf(lobe, ShadingModel::ALL[(at + k) % ShadingModel::ALL.len()]);
-            let share = compare(&device, &Question { method: &*method, brdf: &brdf }, &probes);
-            eprintln!("{spelling} {lobe}: {:.2} % within 1e-5", 100.0 * share);
+            compare(&device, &Question { method: &*method, brdf: &brdf }, &probes);
         }
     }
+}
+
+#[test]
+fn every_method_of_lobes_and_slopes_agrees() {
+    methods_agree(|form| form != FormKind::Whole);
+}
+
+#[test]
+fn every_whole_method_agrees() {
+    methods_agree(|form| form == FormKind::Whole);
 }
 
 #[test]
@@ -291,8 +301,7 @@ fn every_lobe_agrees_in_every_model() {
     for spelling in brdf::TABLE.iter().flat_map(|row| row.samples) {
         for shading in ShadingModel::ALL {
             let brdf = brdf(spelling, shading);
-            let share = compare(&device, &Question { method: &*method, brdf: &brdf }, &probes);
-            eprintln!("{spelling} {}: {:.2} % within 1e-5", shading.name(), 100.0 * share);
+            compare(&device, &Question { method: &*method, brdf: &brdf }, &probes);
         }
     }
 }
@@ -306,9 +315,49 @@ fn displaced_surfaces_agree() {
         for lobe in ["beckmann:0.05", "beckmann:0.4", "ggx:0.2", "lambert"] {
             for shading in [ShadingModel::Masked, ShadingModel::Shadowed] {
                 let brdf = brdf(lobe, shading);
-                let share = compare(&device, &Question { method: &*method, brdf: &brdf }, &probes);
-                eprintln!("{} {lobe} {}: {:.2} % within 1e-5", method, shading.name(), 100.0 * share);
+                compare(&device, &Question { method: &*method, brdf: &brdf }, &probes);
             }
         }
     }
+}
+
+#[test]
+fn inexact_devices_err_by_what_the_standard_allows() {
+    let Some(device) = device() else { return };
+    let shader = "@group(0) @binding(0) var<storage, read> input: array<vec4<f32>>;
+        @group(0) @binding(1) var<storage, read_write> output: array<vec4<f32>>;
+        @compute @workgroup_size(64)
+        fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+            if id.x >= arrayLength(&input) {
+                return;
+            }
+            let x = input[id.x].x;
+            output[id.x] = vec4<f32>(7.0 / x, exp(x), log2(x), dot(input[id.x].yz, vec2<f32>(1.0, -1.0)));
+        }";
+    let inputs: Vec<f32> = (1..=1000).flat_map(|i| [0.01 * i as f32, 3.0, 2.5, 0.0]).collect();
+    let run = |shader: &str| -> Vec<f32> {
+        let bytes = device.compute(shader, bytemuck::cast_slice(&inputs), 16_000, 1000).unwrap();
+        bytemuck::pod_collect_to_vec(&bytes)
+    };
+    let exact = run(shader);
+    let inexact: Vec<_> = (0..8).map(|number| run(&inexact(shader, number))).collect();
+    // The largest change over all inputs and devices, in units of the largest error that is allowed. What the
+    // device itself rounds comes on top: half a unit of 2.5, of 3 and more, of 3, and of 5.5 to a difference.
+    let allowed = |i: usize, k: usize| -> f32 {
+        let (x, value) = (inputs[4 * i], exact[4 * i + k].abs());
+        f32::EPSILON
+            * match k {
+                0 => 2.5 * value,
+                1 => (3.0 + 2.0 * x) * value,
+                2 if value < 1.0 => 4.0,
+                2 => 3.0 * value,
+                // Two units of each term, and one of their sum.
+                _ => 2.0 * 5.5 + value,
+            }
+    };
+    let shares = [0, 1, 2, 3].map(|k| {
+        let share = |other: &Vec<f32>, i: usize| (other[4 * i + k] - exact[4 * i + k]).abs() / allowed(i, k);
+        inexact.iter().flat_map(|o| (0..1000).map(move |i| share(o, i))).fold(0.0, f32::max)
+    });
+    assert!(shares.iter().all(|share| (0.9..1.3).contains(share)), "{shares:?}");
 }

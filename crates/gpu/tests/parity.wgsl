@@ -7,8 +7,8 @@ const STRIDE: u32 = HEAD + 3u * TABLE + ALL_LAYERS;
 @group(0) @binding(1) var<storage, read_write> output: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let i = id.x + id.y * ROW;
+fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = id.x + id.y * groups.x * 64u;
     if i * STRIDE >= arrayLength(&input) {
         return;
     }

@@ -3,8 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
 
 mod common;
+mod inexact;
 
 use common::device;
+use inexact::inexact;
 use ndfmap_core::brdf::AnyLobe;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::environment::{SceneEnvironment, Technique, builtin};
@@ -14,7 +16,7 @@ use ndfmap_core::observe::Unobserved;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_core::{brdf, ndf};
 use ndfmap_gpu::{
-    Antialiasing, Canvas, FinestMaps, Frame, Geometry, Maps, Meshes, Renderer, SceneView, TrueFrame,
+    Antialiasing, Canvas, Device, FinestMaps, Frame, Geometry, Maps, Meshes, Renderer, SceneView, TrueFrame,
 };
 use ndfmap_scene as scene;
 use ndfmap_scene::metrics::{Picture, display, relative_l2};
@@ -28,6 +30,24 @@ const STEP: f32 = 1.0 / 255.0;
 /// Pixels that may be off by more: those in which a triangle's edge passes so near a sample that a rasteriser
 /// and a ray decide otherwise, and those where the number of taps, a whole number, differs for a last digit.
 const MAY_DIFFER: f64 = 1e-3;
+
+/// Changes between inexact devices that a picture may differ by: tosses of coins are no worst case.
+const SPREADS: f64 = 2.0;
+
+/// Renderers of two devices as inexact as the standard allows, the one given apart.
+fn inexact_renderers(device: &Device) -> [Renderer; 2] {
+    let rewrites: [fn(&str) -> String; 2] = [|shader| inexact(shader, 1), |shader| inexact(shader, 2)];
+    rewrites.map(|rewrite| Renderer::new(&device.clone().rewriting_shaders(rewrite)).unwrap())
+}
+
+/// Share of pixels that may be off in a picture that this device drew.
+fn may_be_off(inexact: &[Renderer], canvas: &Canvas, frame: &Frame<'_>, drawn: &Picture) -> f64 {
+    let spread = inexact.iter().map(|renderer| {
+        renderer.draw(canvas, frame).unwrap();
+        off(&canvas.read().unwrap(), drawn, frame.view.scene.exposure)
+    });
+    MAY_DIFFER + SPREADS * spread.fold(0.0, f64::max)
+}
 
 fn staged(name: &str, time: f64, map: usize) -> Scene {
     let size = Size { width: map, height: map };
@@ -47,6 +67,7 @@ fn every_method_draws_what_the_cpu_draws() {
     let Some(device) = device() else { return };
     let (renderer, size) = (Renderer::new(&device).unwrap(), Size { width: 240, height: 200 });
     let canvas = Canvas::new(&device, size, Antialiasing::Parts).unwrap();
+    let inexact = inexact_renderers(&device);
     let scenes = [("disk", 0.4), ("armour", 0.3), ("plane", 0.0)];
     let scenes = scenes.map(|(name, time)| (name, staged(name, time, 128)));
     let methods = ndf::TABLE.iter().flat_map(|row| &row.samples[..1]);
@@ -65,13 +86,16 @@ fn every_method_draws_what_the_cpu_draws() {
                 [(Filtering::TRILINEAR, false), (Filtering::anisotropic(8), spelling.contains("unaligned"))]
             {
                 let lookups = Lookups { sampling: Sampling::Taps(filtering), neighbours, at_means: false };
-                renderer.draw(&canvas, &Frame { view: shown, maps: &ours, lookups }).unwrap();
+                let frame = Frame { view: shown, maps: &ours, lookups };
+                renderer.draw(&canvas, &frame).unwrap();
                 let drawn = canvas.read().unwrap();
                 let traced = traced.render(&scene.camera, size, lookups, &Unobserved).unwrap();
                 let share = off(&drawn, &traced, scene.exposure);
-                eprintln!("{spelling} {name} {} taps: {share:.5} off", filtering.max_taps);
-                if share > MAY_DIFFER {
-                    failed.push((spelling, *name, share));
+                let allowed = may_be_off(&inexact, &canvas, &frame, &drawn);
+                let taps = filtering.max_taps;
+                eprintln!("{spelling} {name} {taps} taps: {share:.5} off, allowed {allowed:.5}");
+                if share > allowed {
+                    failed.push((spelling, *name, share, allowed));
                 }
             }
         }
@@ -127,7 +151,7 @@ fn the_truth_is_the_truth() {
 
 #[test]
 fn the_sampler_is_near_our_taps() {
-    // What samplers do is their own business; but one that is far from a plain trilinear filter would be a
+    // A sampler may do as it likes; but one that is far from a plain trilinear filter would be a
     // bug of ours.
     let Some(device) = device() else { return };
     let (renderer, size) = (Renderer::new(&device).unwrap(), Size { width: 200, height: 200 });
@@ -174,20 +198,23 @@ fn colours_and_roughness_of_maps_are_drawn_too() {
     let on_gpu = Geometry::new(&device, &scene).unwrap();
     let on_cpu = ndfmap_trace::Geometry::new(&scene);
     let shown = SceneView { scene: &scene, geometry: &on_gpu, camera: &scene.camera };
+    let inexact = inexact_renderers(&device);
     let filtering = Filtering::anisotropic(4);
     for spelling in ["vmf:2", "gmm:3", "slopes", "toksvig", "ndm", "ndm:gaussian", "phong:1", "sh:4", "sh:7"]
     {
         let method = spelling.parse::<AnyMethod>().unwrap();
         let ours = Maps::new(&device, &scene.materials, &method, Precision::Half, &|_| ()).unwrap();
         let lookups = Lookups { sampling: Sampling::Taps(filtering), neighbours: false, at_means: false };
-        renderer.draw(&canvas, &Frame { view: shown, maps: &ours, lookups }).unwrap();
+        let frame = Frame { view: shown, maps: &ours, lookups };
+        renderer.draw(&canvas, &frame).unwrap();
         let drawn = canvas.read().unwrap();
         let theirs = BakedMaps::new(&scene.materials, &method, Precision::Half, &|_| ()).unwrap();
         let traced = Filtered { scene: &scene, geometry: &on_cpu, maps: &theirs };
         let traced = traced.render(&scene.camera, size, lookups, &Unobserved).unwrap();
         let (share, apart) = (off(&drawn, &traced, scene.exposure), relative_l2(&drawn, &traced));
-        eprintln!("{spelling}: {share:.5} off, {apart:.5} apart");
-        assert!(share <= MAY_DIFFER, "{spelling}: {share} off, {apart} apart");
+        let allowed = may_be_off(&inexact, &canvas, &frame, &drawn);
+        eprintln!("{spelling}: {share:.5} off, allowed {allowed:.5}, {apart:.5} apart");
+        assert!(share <= allowed, "{spelling}: {share} off, {allowed} allowed, {apart} apart");
     }
 }
 
@@ -225,7 +252,7 @@ fn displaced_scenes_are_the_cpus() {
 }
 
 /// The shares of pixels that are off, of a scene by a method on both devices.
-fn off_by(device: &ndfmap_gpu::Device, scene: &Scene, spelling: &str, size: Size) -> f64 {
+fn off_by(device: &Device, scene: &Scene, spelling: &str, size: Size) -> f64 {
     let (renderer, method) = (Renderer::new(device).unwrap(), spelling.parse::<AnyMethod>().unwrap());
     let canvas = Canvas::new(device, size, Antialiasing::Parts).unwrap();
     let ours = Maps::new(device, &scene.materials, &method, Precision::Half, &|_| ()).unwrap();

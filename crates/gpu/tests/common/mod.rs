@@ -1,4 +1,4 @@
-//! What the tests on a device share.
+//! Device that the tests share.
 
 use ndfmap_gpu::{Device, GpuError};
 
