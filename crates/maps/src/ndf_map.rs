@@ -81,7 +81,7 @@ impl NdfMap {
 
     /// Texel that a pixel sees, filtered over its footprint; `None` where the header names no method.
     #[must_use]
-    pub fn filtered(&self, pixel: &PixelFootprint, filtering: Filtering) -> Option<NdfTexel> {
+    pub fn sample(&self, pixel: &PixelFootprint, filtering: Filtering) -> Option<NdfTexel> {
         let method: AnyMethod = self.header.method.parse().ok()?;
         let mut channels = vec![0.0; self.pyramid.channels()];
         self.pyramid.filtered(pixel, filtering, &mut channels);

@@ -230,7 +230,7 @@ fn a_map_is_read_by_every_method_of_its_channels() {
         for method in readers {
             let read = by(&map, method).unwrap();
             assert_eq!(read.header.method, *method);
-            // What it decodes to is what the method itself would have baked, where nothing is fitted.
+            // It decodes to what the method itself would have baked, where nothing is fitted.
             if !baked_by.starts_with("vmf") {
                 let own = baked(method, "foil", Precision::Single);
                 assert_eq!(

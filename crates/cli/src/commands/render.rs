@@ -13,8 +13,9 @@ use ndfmap::core::lookup::{Filtering, Lookups, Sampling};
 use ndfmap::core::ndf::AnyMethod;
 use ndfmap::core::observe::Observer;
 use ndfmap::maps::atomic;
+use ndfmap::maps::formats::{WritePicture, picture_writer};
 use ndfmap::maps::formats::{read_file, read_ndf};
-use ndfmap::maps::picture::{PictureFormat, write_picture};
+use ndfmap::maps::picture::write_picture;
 use ndfmap::maps::source::{BUILTIN_PREFIX, read_source};
 use ndfmap::render::{self, Frame, RenderJob, RenderReport};
 use ndfmap::report::{SheetPlan, contact_sheet};
@@ -83,7 +84,7 @@ pub(super) struct Render {
     /// still widens it
     #[arg(long, value_parser = brdf_spelling)]
     brdf: Option<String>,
-    /// What goes with the lobe: the factor of Tan et al., of Han et al. or of Smith (tan, han, smith);
+    /// Shading model around the lobe: the factor of Tan et al., of Han et al. or of Smith (tan, han, smith);
     /// or what displaced surfaces have (masked, shadowed)
     #[arg(long, value_parser = ShadingModel::from_str, conflicts_with = "displace")]
     model: Option<ShadingModel>,
@@ -102,11 +103,11 @@ pub(super) struct Render {
     /// Display values are sRGB of light times this
     #[arg(long, value_parser = positive)]
     exposure: Option<f64>,
-    /// How highlights are brought into the range of the PNG that `-o` writes: cut off (clip), or compressed
-    /// (reinhard)
+    /// Tone curve that brings highlights into the range of the PNG that `-o` writes: cut off (clip), or
+    /// compressed (reinhard)
     #[arg(long, default_value = "clip", value_parser = Tone::from_str)]
     tone: Tone,
-    /// What renders
+    /// Device that renders
     #[arg(long, value_enum, default_value_t = Device::Auto)]
     device: Device,
     /// The GPU's own sampler filters maps in place of `--filter`: trilinear, or with up to TAPS taps
@@ -126,7 +127,7 @@ pub(super) struct Render {
     source: SourceArguments,
 }
 
-/// What is displaced.
+/// Displacement of the meshes.
 #[derive(Debug, Args)]
 pub(super) struct DisplaceArguments {
     /// Height maps displace what they lie on, by SCALE times what keeps their slopes; lobes become
@@ -153,7 +154,7 @@ fn scale(text: &str) -> Result<f64, String> {
     }
 }
 
-/// How maps are looked up.
+/// Look-up of maps.
 #[derive(Debug, Args)]
 pub(super) struct FilterArguments {
     /// `trilinear`; `anisotropic:N`, with up to N taps along the longer axis, as texture units do; or
@@ -309,20 +310,14 @@ pub(super) fn check_drift(size: Size) -> Result<(), Error> {
     Ok(())
 }
 
-/// Checks that a picture can be written under this name.
-fn checked(path: &Path) -> Result<(), Error> {
-    match PictureFormat::of(path) {
-        Some(_) => Ok(()),
-        None => Err(Error::Request(format!("{}: pictures are written as .png or .exr", path.display()))),
-    }
-}
-
 impl Render {
     pub(super) fn run(self, json: bool) -> Result<(), Error> {
         let start = Instant::now();
-        self.output.iter().chain(&self.truth_output).try_for_each(|path| checked(path))?;
+        for path in self.output.iter().chain(&self.truth_output) {
+            picture_writer(path).map_err(|e| Error::Request(e.to_string()))?;
+        }
         if let Some(sheet) = &self.compare
-            && PictureFormat::of(sheet) != Some(PictureFormat::Png)
+            && !matches!(picture_writer(sheet), Ok(WritePicture::Display(_)))
         {
             return Err(Error::Request(format!("{}: contact sheets are written as .png", sheet.display())));
         }
@@ -478,11 +473,11 @@ impl Render {
             let (Some(path), Some(picture)) = (path, picture) else { continue };
             let path = if frames > 1 { numbered(path, at) } else { path.clone() };
             say_if_replaced(&path);
-            if self.tone == Tone::Clip || PictureFormat::of(&path) != Some(PictureFormat::Png) {
-                write_picture(&path, picture, frame.exposure)?;
-            } else {
+            if self.tone != Tone::Clip && matches!(picture_writer(&path)?, WritePicture::Display(_)) {
                 let shown = |x, y| self.tone.map(picture.row(y)[x] * frame.exposure);
                 write_picture(&path, &Grid::from_fn(picture.size(), shown), 1.0)?;
+            } else {
+                write_picture(&path, picture, frame.exposure)?;
             }
             written.push(path);
         }

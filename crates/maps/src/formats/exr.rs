@@ -13,14 +13,16 @@ use ::exr::meta::attribute::{AttributeValue, Text};
 use ::exr::meta::{BlockDescription, MetaData};
 use ::exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image as ExrImage, ImageAttributes,
-    IntegerBounds, Layer, LayerAttributes, Levels, LineOrder, ReadChannels, ReadLayers, Vec2, WritableImage,
-    f16, read,
+    IntegerBounds, Layer, LayerAttributes, Levels, LineOrder, ReadChannels, ReadLayers, SpecificChannels,
+    Vec2, WritableImage, f16, read,
 };
+use glam::Vec3;
 use ndfmap_core::grid::Size;
 use ndfmap_core::ndf::Encoding as Channels;
 use ndfmap_core::pyramid::{Precision, Pyramid, level_sizes};
+use ndfmap_scene::metrics::Picture;
 
-use super::{ChannelLayout, Format, WriteOptions};
+use super::{ChannelLayout, EncodedPicture, Format, WriteOptions, WritePicture};
 use crate::atomic::AtomicFile;
 use crate::header::{Source, SourceKind, VERSION};
 use crate::image::{MAX_TEXELS, check_size};
@@ -33,6 +35,7 @@ pub(super) const FORMAT: Format = Format {
     read_image: Some(read_image),
     read_ndf: Some(read_ndf),
     write_ndf: Some(write_ndf),
+    write_picture: Some(WritePicture::Linear(write_picture)),
     ..Format::READ_ONLY
 };
 
@@ -310,6 +313,21 @@ fn read_bumpslopes(
         levels.push(bytes);
     }
     NdfMap::assemble(path, header, precision, levels)
+}
+
+/// Writes a picture: 32-bit floats of linear RGB.
+fn write_picture(picture: &Picture) -> EncodedPicture {
+    let size = picture.size();
+    let channels = SpecificChannels::rgb(|p: Vec2<usize>| {
+        let Vec3 { x, y, z } = picture.row(p.y())[p.x()];
+        (x, y, z)
+    });
+    // In any other order, blocks lie in the file as threads finish them.
+    let encoding = Encoding { line_order: LineOrder::Increasing, ..Encoding::FAST_LOSSLESS };
+    let layer = Layer::new((size.width, size.height), LayerAttributes::default(), encoding, channels);
+    let mut bytes = Cursor::new(Vec::new());
+    ExrImage::from_layer(layer).write().to_buffered(&mut bytes).map_err(|e| e.to_string())?;
+    Ok(bytes.into_inner())
 }
 
 /// Writes a map in either layout of channels.

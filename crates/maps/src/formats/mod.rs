@@ -9,7 +9,7 @@ pub mod exr;
 mod hdr;
 mod jpeg;
 pub mod ktx2;
-mod png;
+pub mod png;
 mod tga;
 #[cfg(feature = "tiff")]
 mod tiff;
@@ -17,8 +17,10 @@ mod tiff;
 use std::path::Path;
 
 use ndfmap_core::bake::LevelSink;
+use ndfmap_core::grid::Size;
 use ndfmap_core::pyramid::{Layout, Precision};
 use ndfmap_core::words;
+use ndfmap_scene::metrics::Picture;
 
 use crate::{Header, Image, MapError, NdfMap};
 
@@ -33,6 +35,18 @@ pub type WriteNdf = fn(&Path, &NdfMap, &WriteOptions) -> Result<u64, MapError>;
 
 /// Opens a file that a map is baked into, row by row.
 pub type OpenSink = fn(&Path, &Header, Layout) -> Result<Box<dyn NdfSink>, MapError>;
+
+/// Bytes of a picture's file, or the failure of the encoder.
+pub type EncodedPicture = Result<Vec<u8>, String>;
+
+/// Writer of rendered pictures: what it takes is what a file of the format holds.
+#[derive(Clone, Copy)]
+pub enum WritePicture {
+    /// Display values, 8 bits of sRGB, in rows.
+    Display(fn(&[[u8; 3]], Size) -> EncodedPicture),
+    /// Linear light.
+    Linear(fn(&Picture) -> EncodedPicture),
+}
 
 /// File that a map is being baked into. Nothing of it is left when it is dropped unfinished.
 pub trait NdfSink: LevelSink<Error = MapError> {
@@ -82,6 +96,8 @@ pub struct Format {
     pub write_ndf: Option<WriteNdf>,
     /// Opens a file to bake into, in the format's plain form.
     pub open_sink: Option<OpenSink>,
+    /// Writes a rendered picture.
+    pub write_picture: Option<WritePicture>,
 }
 
 impl Format {
@@ -94,6 +110,7 @@ impl Format {
         read_ndf: None,
         write_ndf: None,
         open_sink: None,
+        write_picture: None,
     };
 }
 
@@ -141,6 +158,19 @@ pub fn to_write(path: &Path) -> Result<&'static Format, MapError> {
     written().find(|f| f.extensions.contains(&extension.as_str())).ok_or_else(|| {
         let names: Vec<String> = written().map(|f| format!(".{}", f.extensions[0])).collect();
         MapError::unsupported(path, format!("maps are written as {}", names.join(" or ")))
+    })
+}
+
+/// Writer of the format that a picture's name asks for by its usual extension.
+///
+/// # Errors
+/// [`MapError`] for a name of no format that pictures are written in.
+pub fn picture_writer(path: &Path) -> Result<WritePicture, MapError> {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let mut writers = TABLE.iter().filter_map(|f| Some((f.extensions[0], f.write_picture?)));
+    writers.clone().find(|(usual, _)| *usual == extension).map(|(_, writer)| writer).ok_or_else(|| {
+        let names: Vec<String> = writers.by_ref().map(|(usual, _)| format!(".{usual}")).collect();
+        MapError::unsupported(path, format!("pictures are written as {}", names.join(" or ")))
     })
 }
 

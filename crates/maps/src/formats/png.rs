@@ -5,8 +5,9 @@ use std::io::Cursor;
 use std::path::Path;
 
 use ::png::{BitDepth, ColorType, DecodeOptions, Decoder, Limits, Transformations};
+use ndfmap_core::grid::Size;
 
-use super::Format;
+use super::{EncodedPicture, Format, WritePicture};
 use crate::image::check_size;
 use crate::{Image, MapError, Samples};
 
@@ -15,11 +16,30 @@ pub(super) const FORMAT: Format = Format {
     extensions: &["png"],
     magic: &[b"\x89PNG\r\n\x1a\n"],
     read_image: Some(read),
+    write_picture: Some(WritePicture::Display(encode)),
     ..Format::READ_ONLY
 };
 
 /// Deflate cannot shrink below 1/1032 of its output.
 const MAX_DEFLATE_RATIO: usize = 1032;
+
+/// PNG file of an 8-bit RGB picture.
+///
+/// # Errors
+/// Failure of the encoder, as text.
+pub fn encode(pixels: &[[u8; 3]], size: Size) -> EncodedPicture {
+    let encode = || {
+        let mut bytes = Vec::new();
+        let mut encoder = ::png::Encoder::new(&mut bytes, size.width as u32, size.height as u32);
+        encoder.set_color(::png::ColorType::Rgb);
+        encoder.set_depth(::png::BitDepth::Eight);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(pixels.as_flattened())?;
+        writer.finish()?;
+        Ok(bytes)
+    };
+    encode().map_err(|e: ::png::EncodingError| e.to_string())
+}
 
 fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
     let invalid = |e: ::png::DecodingError| MapError::invalid(path, e);

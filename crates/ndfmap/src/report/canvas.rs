@@ -3,7 +3,7 @@
 use font8x8::{BASIC_FONTS, LATIN_FONTS, UnicodeFonts};
 
 use ndfmap_core::grid::Size;
-use ndfmap_maps::picture::png_bytes;
+use ndfmap_maps::formats::png;
 
 use crate::Error;
 
@@ -52,7 +52,7 @@ impl Canvas {
     /// The picture as a PNG file.
     pub(super) fn to_png(&self) -> Result<Vec<u8>, Error> {
         let size = Size { width: self.width, height: self.height };
-        png_bytes(&self.pixels, size).map_err(|e| Error::Failed(format!("cannot write a picture: {e}")))
+        png::encode(&self.pixels, size).map_err(|e| Error::Failed(format!("cannot write a picture: {e}")))
     }
 }
 
