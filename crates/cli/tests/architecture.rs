@@ -1,4 +1,4 @@
-//! What ARCHITECTURE.md and CONTRIBUTING.md promise, held by tests.
+//! Promises of ARCHITECTURE.md and CONTRIBUTING.md, held by tests.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
 
@@ -276,7 +276,7 @@ fn every_crate_can_be_packed() {
         let readme = std::fs::read_to_string(folder.join("README.md")).unwrap();
         assert!(readme.starts_with("# ndfmap"), "{}", folder.display());
     }
-    // What is included lies in the crate that includes it, or the packed crate would not build.
+    // An included file lies in the crate that includes it, or the packed crate would not build.
     for file in tracked().iter().filter(|f| f.extension().is_some_and(|e| e == "rs")) {
         let Some(of) = file.iter().nth(1).filter(|_| file.starts_with("crates")) else { continue };
         let text = read(file);

@@ -223,7 +223,7 @@ fn compare_prints_one_document_and_a_report_stands_alone() {
     assert_eq!(compared["methods"]["slopes"]["bytes_per_texel"], 16);
     assert_eq!(compared["methods"]["naive"]["levels"].as_array().unwrap().len(), 7);
     assert!(compared["methods"]["naive"]["filtering"].is_null());
-    // What the project exists for: keeping the spread beats forgetting it.
+    // Purpose of the project: keeping the spread beats forgetting it.
     assert!(error("toksvig", 5) < 0.5 * error("naive", 5));
     let page = std::fs::read_to_string(Path::new(&report).join("report.html")).unwrap();
     assert!(
@@ -256,7 +256,7 @@ fn filtering_is_measured_and_drawn() {
     assert_eq!(told["methods"]["toksvig"]["filtering"].as_array().unwrap().len(), 5);
     assert_eq!(told["methods"]["toksvig"]["filtering"][2]["level"], 3);
     assert!(at("vmf:4", "between") < at("vmf:4:unaligned", "between"));
-    // What cannot be filtered is shaded texel by texel.
+    // A method that cannot be filtered is shaded texel by texel.
     assert_eq!(at("phong:2", "between"), at("phong:2", "reference"));
     assert!(Path::new(&report).join("alignment.png").exists());
     let page = std::fs::read_to_string(Path::new(&report).join("report.html")).unwrap();

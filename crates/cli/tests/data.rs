@@ -143,7 +143,7 @@ fn alignment_pays_between_the_texels_of_real_maps() {
             between("vmf:4:unaligned"),
             between("toksvig")
         );
-        // How much is gained differs from map to map (the benchmark `lobes` has the medians); something
+        // The gain differs from map to map (the benchmark `lobes` has the medians); something
         // always is.
         assert!(between("vmf:4") < between("vmf:4:parent"), "{map}");
         assert!(

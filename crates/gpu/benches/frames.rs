@@ -62,7 +62,7 @@ fn parsed<'s>(spellings: &[&'s str]) -> Outcome<Vec<(&'s str, AnyMethod)>> {
     spellings.iter().map(|m| Ok((*m, m.parse::<AnyMethod>()?))).collect()
 }
 
-/// How a method is drawn here: lobes that are not aligned need every texel shaded.
+/// Look-ups of a method: lobes that are not aligned need every texel shaded.
 fn lookups(spelling: &str, sampling: Sampling) -> Lookups {
     let neighbours = spelling.ends_with("unaligned");
     let sampling = if neighbours { Sampling::Taps(Filtering::TRILINEAR) } else { sampling };

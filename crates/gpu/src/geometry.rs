@@ -44,7 +44,7 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// Uploads the meshes without their relief; [`crate::Meshes`] cuts the meshes that have it.
+    /// Uploads the meshes as they are; [`crate::Meshes`] cuts the displaced ones.
     ///
     /// # Errors
     /// [`GpuError`] for a scene larger than the device's buffers.

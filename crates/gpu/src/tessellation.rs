@@ -1,4 +1,4 @@
-//! Meshes with relief on the GPU: cut anew for each picture, by compute passes that work out their points and
+//! Displaced meshes on the GPU: cut anew for each picture, by compute passes that work out their points and
 //! triangles.
 //!
 //! A picture costs a plan on the CPU, a pass over the base mesh. The memory in use is bounded by that mesh
@@ -40,7 +40,7 @@ struct Cut {
 
 /// A mesh, as it is before it is cut.
 enum Base {
-    /// Mesh without relief, ready to be drawn.
+    /// Mesh that is not displaced, ready to be drawn.
     Plain {
         vertices: Vec<Corner>,
         corners: Vec<u32>,
@@ -65,7 +65,7 @@ pub struct Meshes<'a> {
 }
 
 impl<'a> Meshes<'a> {
-    /// Uploads the meshes, and the heights of those with relief.
+    /// Uploads the meshes, and the heights of the displaced ones.
     ///
     /// # Errors
     /// [`GpuError`] for a scene larger than the device's buffers.
@@ -103,7 +103,7 @@ impl<'a> Meshes<'a> {
         })
     }
 
-    /// Cuts the meshes with relief for a picture of this size.
+    /// Cuts the displaced meshes for a picture of this size.
     ///
     /// # Errors
     /// [`GpuError`] for more triangles than the device's buffers hold.

@@ -1,4 +1,4 @@
-//! How long a bake takes, without files, against a plain copy of its input and output; and its error.
+//! Time of a bake, without files, against a plain copy of its input and output; and its error.
 //!
 //! Machines are noisy, so the copy and the bakes take turns and ratios are between medians of one run.
 //! `NDFMAP_BENCH_SIZE` sets the map's side (default 4096), `NDFMAP_BENCH_RUNS` the turns (default 5).

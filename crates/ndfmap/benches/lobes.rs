@@ -1,4 +1,4 @@
-//! What fitted lobes cost and gain: seconds and nanoseconds a texel by map size, and errors against
+//! Cost and gain of fitted lobes: seconds and nanoseconds a texel by map size, and errors against
 //! Toksvig's, at texels and between them, over several maps; medians in one table.
 //!
 //! `NDFMAP_BENCH_SIZE` is the largest side timed (default 4096), `NDFMAP_BENCH_RUNS` the turns (default 3).

@@ -44,7 +44,7 @@ pub struct SourceReport {
     pub height: usize,
     /// Source that it was read from.
     pub source: Source,
-    /// Length of the mean normal; 1 for a map without relief.
+    /// Length of the mean normal; 1 for a flat map.
     pub mean_normal_length: f64,
     /// Variance of the slopes along x and along y.
     pub slope_variance: [f64; 2],

@@ -49,7 +49,7 @@ fn options_that_contradict_each_other_are_refused_before_the_bake() {
     let zstd = WriteOptions { zstd: Some(3), ..WriteOptions::default() };
     let nine = || Slopes::with_grid(9).unwrap();
     assert!(matches!(refused(Vmf::new(2).unwrap().into(), "a.exr", bumpslopes), Error::Request(_)));
-    // What `slopes:9` stores is what `slopes` does.
+    // `slopes:9` stores what `slopes` does.
     let path = folder.path().join("nine.exr");
     BakeJob::new(&map, nine()).save(&path, &bumpslopes).unwrap();
     assert_eq!(NdfMap::open(&path).unwrap().header.method, "slopes:9");

@@ -1,7 +1,7 @@
-//! Relief: displacement of a mesh by the height map that lies on it.
+//! Displacement of a mesh by the height map that lies on it.
 //!
-//! A mesh with relief is displaced along its normals by `depth` times the height. Shading works in the frames
-//! of the mesh as it was, where the slopes of the relief are those of the map, but for how the map is
+//! A mesh is displaced along its normals by `depth` times the height. Shading works in the frames
+//! of the mesh as it was, where the slopes of the surface are those of the map, but for how the map is
 //! stretched: with `P_x` and `P_y` how a place moves per texture width on the map, as seen in the frame, a
 //! slope m of the map becomes `depth (P_x P_y)⁻ᵀ m` on the surface. Where the map is laid on evenly, at
 //! `depth` per texture width, that is m. (The surface is taken for flat over the reach of a pixel, as LEADR
@@ -26,7 +26,7 @@ pub struct Displacement {
     pub width: f64,
     /// World length of a height of one texture width.
     pub depth: f64,
-    /// Greatest world length by which the relief stands out or goes in.
+    /// Greatest world length by which the surface stands out or goes in.
     pub reach: f64,
 }
 
@@ -95,8 +95,8 @@ pub(super) fn texture_width<'a>(meshes: impl Iterator<Item = &'a Mesh>, aspect: 
 }
 
 impl Mesh {
-    /// The mesh in triangles small enough for a relief to be tessellated in, with the matrix at each vertex
-    /// that takes slopes of the map to the surface.
+    /// The mesh in triangles small enough for a displacement to be tessellated in, with the matrix at each
+    /// vertex that takes slopes of the map to the surface.
     #[must_use]
     pub fn with_displacement(&self, displacement: &Displacement) -> Self {
         split(&Self { stretches: self.slope_maps(displacement), ..self.clone() })

@@ -193,7 +193,7 @@ impl Scene {
         if any { Ok(()) } else { Err(NoHeights) }
     }
 
-    /// The scene as a picture of this size sees it: meshes with relief cut and displaced.
+    /// The scene as a picture of this size sees it: displaced meshes cut and moved.
     #[must_use]
     pub fn displaced_for(&self, camera: &Camera, size: Size) -> Vec<Object> {
         let rays = camera.rays(size);
@@ -208,7 +208,7 @@ impl Scene {
         self.objects.iter().map(displaced).collect()
     }
 
-    /// True where some material has relief.
+    /// True where some material is displaced.
     #[must_use]
     pub fn is_displaced(&self) -> bool {
         self.materials.iter().any(|m| m.displacement.is_some())

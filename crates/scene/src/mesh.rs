@@ -23,7 +23,7 @@ pub struct Mesh {
     pub vertices: Vec<Vertex>,
     /// Indices of the three corners of each triangle.
     pub triangles: Vec<[u32; 3]>,
-    /// Matrices that take slopes of the map to a mesh with relief, one for each vertex; else none.
+    /// Matrices that take slopes of the map to a displaced mesh, one for each vertex; else none.
     pub stretches: Vec<Mat2>,
 }
 

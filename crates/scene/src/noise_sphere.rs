@@ -1,8 +1,8 @@
 //! A sphere of Gaussian roughness, lit from where it is seen, after Dupuy et al. 2013, tables 3 to 5; meant
 //! to be displaced.
 //!
-//! Its map is of longitude and latitude. The slopes are the same everywhere only as relief, which knows how
-//! the map is stretched.
+//! Its map is of longitude and latitude. The slopes are the same everywhere only as a displacement, which
+//! knows how the map is stretched.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -22,8 +22,8 @@ const DEVIATION: f64 = 0.25;
 fn build(staging: &SceneOptions, grain: Grain) -> Scene {
     let mesh = Mesh::from_patch((128, 64), DVec2::ONE, |s, t| ball(s + 0.25, t));
     let Size { width, .. } = staging.map_size;
-    // World length of a texture width in the mean over the sphere, as relief takes it: its area is that of
-    // half a square texture.
+    // World length of a texture width in the mean over the sphere, as a displacement takes it: its area is
+    // that of half a square texture.
     let depth = (8.0 * PI).sqrt();
     let own = || {
         let size = Size { width: 2 * width, height: width };

@@ -1,4 +1,4 @@
-//! Tessellation: a mesh with relief in triangles of about four pixels, displaced by the heights of the same
+//! Tessellation: a displaced mesh in triangles of about four pixels, moved by the heights of the same
 //! scale.
 //!
 //! Each triangle of the base mesh is a patch: a grid of `segments` on a side, a power of two. Its longest
@@ -111,7 +111,7 @@ impl Frustum {
         let along = q - p;
         let length = along.length();
         let at = ((self.eye - p).dot(along) / (length * length).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        // The relief may come nearer, but not more than half the way.
+        // The displaced surface may come nearer, but not more than half the way.
         let distance = p.lerp(q, at).distance(self.eye);
         let distance = (distance - displacement.reach).max(distance / 2.0);
         let pixels = length / (distance * self.pixel).max(f64::MIN_POSITIVE);
@@ -122,7 +122,7 @@ impl Frustum {
     }
 }
 
-/// Plan for cutting a mesh with relief for a picture.
+/// Plan for cutting a displaced mesh for a picture.
 #[must_use]
 pub fn plan(mesh: &Mesh, displacement: &Displacement, rays: &Rays, size: Size) -> Plan {
     let frustum = Frustum::new(rays, size);

@@ -57,12 +57,12 @@ pub struct Place {
     pub material: usize,
     /// Index into the scene's objects.
     pub object: usize,
-    /// Matrix that takes slopes of the map to the frame, on a mesh with relief.
+    /// Matrix that takes slopes of the map to the frame, on a displaced mesh.
     pub stretch: Option<DMat2>,
 }
 
 impl Geometry {
-    /// Builds the hierarchy. Meshes with relief are not displaced; their places still say how slopes lie on
+    /// Builds the hierarchy. Displaced meshes stay where they were; their places still say how slopes lie on
     /// them, as bump maps want.
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
@@ -75,7 +75,7 @@ impl Geometry {
         Self::of(scene, &scene.displaced_for(camera, size))
     }
 
-    /// Builds it from only the meshes that have no relief.
+    /// Builds it from only the meshes that are not displaced.
     #[must_use]
     pub fn without_displacement(scene: &Scene) -> Self {
         let bare = |o: &Object| match scene.materials[o.material].displacement {
@@ -154,7 +154,7 @@ impl Geometry {
     ///
     /// Seen from behind, a surface shows its back, frame turned about the tangent. Where the normal between
     /// corners has turned away from an eye that the triangle itself faces, it is bent back until it just does
-    /// not: else there would be holes. Not so where `unbent`: facets of relief may be seen where the base
+    /// not: else there would be holes. Not so where `unbent`: displaced facets may be seen where the base
     /// mesh is not.
     #[must_use]
     pub fn place(&self, hit: &Hit, direction: DVec3, unbent: bool) -> Place {
@@ -169,8 +169,8 @@ impl Geometry {
         let facing = -normal.dot(direction);
         let stretch = self.stretches.get(hit.triangle as usize).map(|[p, q, u]| {
             let stretch = (*p).as_dmat2() * r + (*q).as_dmat2() * s + (*u).as_dmat2() * t;
-            // From behind, relief that stands out goes in, along the turned frame: only the slope along the
-            // tangent changes its sign.
+            // From behind, a displacement that stands out goes in, along the turned frame: only the slope
+            // along the tangent changes its sign.
             DMat2::from_diagonal(DVec2::new(side, 1.0)) * stretch
         });
         let stretch = stretch.filter(|stretch| stretch.is_finite());

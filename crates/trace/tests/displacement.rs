@@ -66,7 +66,7 @@ fn camera(wo: DVec3) -> Camera {
     Camera { up: DVec3::X, ..Camera::new((wo * away).to_array(), [0.0; 3], degrees) }
 }
 
-/// What the displaced plane sends to the eye, by rays.
+/// Light that the displaced plane sends to the eye, by rays.
 fn by_rays(scene: &Scene, rays: usize) -> f64 {
     let (geometry, displacement) = (Geometry::without_displacement(scene), DisplacedMeshes::new(scene));
     let truth = Truth::displaced(scene, &geometry, &displacement);
@@ -76,7 +76,7 @@ fn by_rays(scene: &Scene, rays: usize) -> f64 {
     .into()
 }
 
-/// What a method makes of the whole map, in this light.
+/// Light that a method makes of the whole map.
 fn by_method(scene: &Scene, channels: &[f32], method: &dyn Method, wo: DVec3) -> f64 {
     let material = &scene.materials[0];
     let prepared = method.prepare(&material.brdf, SlopeVariance::ZERO);
@@ -209,8 +209,8 @@ fn leadr_is_exact_on_gaussian_surfaces() {
     for deviations in [DVec2::splat(0.25), DVec2::new(0.5, 0.1)] {
         let [diffuse, specular] = errors(deviations, "beckmann:0.1", 3, 4096);
         println!("{deviations}: diffuse {diffuse:.4}, specular {specular:.4}");
-        // What the paper's "exact" is held to here. Chance leaves some 0.01 in three surfaces of 4096 rays a
-        // way.
+        // Bound that the paper's "exact" is held to here. Chance leaves some 0.01 in three surfaces of 4096
+        // rays a way.
         assert!(diffuse < 0.03 && specular < 0.03, "{deviations}: {diffuse} {specular}");
     }
 }
@@ -250,7 +250,7 @@ fn a_groove_displaced_is_its_two_flanks_as_seen() {
         let lit = flanks.map(|n| 0.8 / PI * n.normalize().dot(directions.wi).max(0.0));
         let expected = (seen[0] * lit[0] + seen[1] * lit[1]) / (seen[0] + seen[1]);
         let got = by_rays(&scene, 8192);
-        // Which flank a ray meets is chance: half of 1/sqrt(8192) at most of what parts them, 4.5 times;
+        // A ray meets either flank by chance: half of 1/sqrt(8192) at most of what parts them, 4.5 times;
         // strata do better. Corners at the top of a texel are cut by facets half as wide: none.
         let chance = 4.5 * 0.5 * (lit[0] - lit[1]).abs() / 8192_f64.sqrt();
         assert!((got - expected).abs() < chance + 1e-6, "{got} for {expected}");

@@ -87,7 +87,7 @@ fn every_lobe_is_right_in_a_furnace() {
         for shading in [ShadingModel::Han, ShadingModel::Smith, ShadingModel::Masked, ShadingModel::Shadowed]
         {
             if spelling.parse::<AnyLobe>().unwrap().measured().is_some() && shading != ShadingModel::Han {
-                // What was measured has its own masking in it.
+                // A measured lobe has its own masking in it.
                 continue;
             }
             let white = builtin::find("white").unwrap().build();

@@ -18,13 +18,13 @@ use ndfmap::maps::source::{Convention, DEFAULT_HEIGHT_SCALE, SourceOptions};
 use ndfmap::{Error, RotatingEnvironment, scene};
 use serde_json::json;
 
-/// How to take the source map.
+/// Reading of the source map.
 #[derive(Debug, Args)]
 pub(super) struct SourceArguments {
     /// Take the map as normals or as heights [default: grey pictures are heights]
     #[arg(long, value_enum)]
     from: Option<From>,
-    /// Which way green points in a normal map: up (opengl) or down (directx)
+    /// Direction of green in a normal map: up (opengl) or down (directx)
     #[arg(long, value_enum, default_value_t = ConventionArgument::Opengl)]
     convention: ConventionArgument,
     /// Height of one unit (full white), in texture widths
@@ -33,15 +33,15 @@ pub(super) struct SourceArguments {
     /// White is deep: the height map is a depth map
     #[arg(long)]
     invert: bool,
-    /// How slopes are taken from heights
+    /// Derivative that takes slopes from heights
     #[arg(long, value_enum, default_value_t = FilterArgument::Central)]
     slope_filter: FilterArgument,
-    /// What lies beyond the edges: `repeat`, `clamp`, or one for each axis as in `repeat,clamp`
+    /// Continuation beyond the edges: `repeat`, `clamp`, or one for each axis as in `repeat,clamp`
     #[arg(long, value_name = "X[,Y]", default_value = "repeat", value_parser = wraps)]
     wrap: Wraps,
 }
 
-/// How large built-in maps are made.
+/// Size of built-in maps.
 #[derive(Debug, Args)]
 pub(super) struct BuiltinSize {
     /// Size of a built-in map, as in 512 or 640x480
@@ -124,7 +124,7 @@ pub(super) struct EnvironmentArguments {
     /// goes from 0 to 1
     #[arg(long, value_name = "DEGREES[,TO]", value_parser = turn, allow_hyphen_values = true, requires = "environment")]
     turn: Option<[f64; 2]>,
-    /// How highlights look the environment up: cubes that microfacets have blurred (prefiltered), or Han et
+    /// Environment as highlights see it: cubes that microfacets have blurred (prefiltered), or Han et
     /// al.'s series over half-vectors (harmonics)
     #[arg(long, value_name = "HOW", default_value = "prefiltered", value_parser = Technique::from_str, requires = "environment")]
     environment_light: Technique,

@@ -32,7 +32,7 @@ pub(super) struct Bake {
     /// The file to write: `.ktx2` or `.exr`
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// How to represent the normals; `--help` lists them. `auto` measures this map and chooses
+    /// Method that represents the normals; `--help` lists them. `auto` measures this map and chooses
     #[arg(short, long, default_value = "slopes", value_parser = method_or_auto)]
     method: String,
     /// For `auto`: the cheapest method whose error is at most this

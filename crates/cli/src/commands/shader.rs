@@ -23,7 +23,7 @@ pub(super) struct Shader {
     /// The reflectance lobe
     #[arg(long, default_value = "ggx:0.2", value_parser = brdf_spelling)]
     brdf: String,
-    /// What goes with the lobe: the factor of Tan et al., of Han et al. or of Smith (tan, han, smith)
+    /// Shading model around the lobe: the factor of Tan et al., of Han et al. or of Smith (tan, han, smith)
     #[arg(long, default_value = "smith", value_parser = ShadingModel::from_str)]
     model: ShadingModel,
     /// The language

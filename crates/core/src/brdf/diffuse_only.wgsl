@@ -19,7 +19,7 @@ fn lobe_masking(u: f32, width: f32) -> f32 {
     return 1.0;
 }
 
-// Diffuse facets have relief too: Beckmann's.
+// Visible area of diffuse facets, of Beckmann's form.
 fn lobe_visible_area(mean: f32, deviation: f32) -> f32 {
     return mean_of_positive_part(mean, deviation * deviation);
 }

@@ -18,7 +18,7 @@ use super::{LobeFactors, Microfacets, mean_of_positive_part};
 use crate::sphere::{gauss_legendre, legendre};
 use crate::units::SlopeVariance;
 
-/// Which vector the lobe takes beside the normal.
+/// Vector that the lobe takes beside the normal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Argument {
     /// The direction to the light.

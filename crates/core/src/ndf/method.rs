@@ -169,7 +169,7 @@ pub trait Representation: Describe + Clone + PartialEq + 'static {
     }
 }
 
-/// Effective lobe of a map without any relief, by a method.
+/// Effective lobe of a flat map, by a method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlatLobe {
     /// The lobe itself.

@@ -22,7 +22,7 @@ fn material_params(diffuse_roughness: vec4<f32>, specular: vec4<f32>) -> Surface
 fn shade(place: Place, channels: ptr<function, Channels>, plain: SurfaceParams) -> vec3<f32> {
     var decoded = decode(channels);
     var sum = vec3<f32>(0.0);
-    // A facet of relief may face lights and eyes that its base turns its back on.
+    // A displaced facet may face lights and eyes that its base turns its back on.
     let displaced = KNOWS_DISPLACEMENT && place.displaced;
     if place.wo.z <= 0.0 && !displaced {
         return sum;

@@ -1,4 +1,4 @@
-// Works out the triangles of meshes with relief from their points: one invocation for each. Twin of
+// Works out the triangles of displaced meshes from their points: one invocation for each. Twin of
 // `triangle` in geometry.rs.
 
 @group(0) @binding(2) var<storage, read> vertices: array<Vertex>;

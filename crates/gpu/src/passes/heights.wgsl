@@ -1,4 +1,4 @@
-// Common part of the passes that cut meshes with relief. Heights lie in a buffer, level after level.
+// Common part of the passes that cut displaced meshes. Heights lie in a buffer, level after level.
 
 struct Cut {
     // Position of the eye, relative to the scene's middle.

@@ -1,4 +1,4 @@
-// Works out the points of meshes with relief: one invocation for each.
+// Works out the points of displaced meshes: one invocation for each.
 
 @group(0) @binding(2) var<storage, read> base_vertices: array<Vertex>;
 @group(0) @binding(3) var<storage, read> base_corners: array<u32>;

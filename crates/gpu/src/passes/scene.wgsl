@@ -79,7 +79,7 @@ struct Place {
     // Change of uv to the next pixel on the right, and below.
     duv_dx: vec2<f32>,
     duv_dy: vec2<f32>,
-    // True on a mesh with relief; `stretch` then takes slopes of the map to the frame.
+    // True on a displaced mesh; `stretch` then takes slopes of the map to the frame.
     displaced: bool,
     stretch: mat2x2<f32>,
 }
@@ -98,7 +98,7 @@ fn differential(step: vec3<f32>, ray: vec3<f32>, face: vec3<f32>, distance: f32)
     return distance * inverseSqrt(dot(ray, ray)) * (step - ray * (dot(step, face) / held));
 }
 
-// `unbent`: facets of relief are shaded where the base mesh turns its back, too.
+// `unbent`: displaced facets are shaded where the base mesh turns its back, too.
 fn place_of(in: Varying, unbent: bool) -> Place {
     let triangle = triangles[in.triangle];
     let ray = view.corner + view.right * in.pixel.x + view.down * in.pixel.y;

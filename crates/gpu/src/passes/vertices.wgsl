@@ -8,14 +8,14 @@ struct Vertex {
     normal_v: vec4<f32>,
     // Unit tangent, and the sign of the bitangent.
     tangent: vec4<f32>,
-    // Matrix that takes slopes of the map to the surface, by columns, on a mesh with relief.
+    // Matrix that takes slopes of the map to the surface, by columns, on a displaced mesh.
     stretch: vec4<f32>,
 }
 
 struct Triangle {
     // Unit normal, and the object.
     face: vec4<f32>,
-    // Gradients of u and v over places; the first has a 1 on a mesh with relief.
+    // Gradients of u and v over places; the first has a 1 on a displaced mesh.
     grad_u: vec4<f32>,
     grad_v: vec4<f32>,
 }

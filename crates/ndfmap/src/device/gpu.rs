@@ -69,7 +69,7 @@ impl Engine for Gpu {
         observer: &dyn Observer,
     ) -> Result<TruePicture, Error> {
         if view.scene.is_displaced() || view.scene.environment.is_some() {
-            // Facets of relief, and light that is drawn by chance, need rays.
+            // Displaced facets, and light that is drawn by chance, need rays.
             let geometry = TrueGeometry::new(view.scene, observer);
             return Ok(geometry.truth(view.scene).render(&view.camera, view.size, effort, observer)?);
         }

@@ -56,7 +56,7 @@ pub(crate) struct RenderedPicture {
     pub(crate) milliseconds: f64,
 }
 
-/// Geometry for the CPU renderer's truth, of a scene with relief or without.
+/// Geometry for the CPU renderer's truth, of a scene, displaced or not.
 pub(crate) struct TrueGeometry {
     plain: Geometry,
     displacement: Option<DisplacedMeshes>,

@@ -1,4 +1,4 @@
-//! Least and greatest heights under any part of a map, from which boxes around relief are made.
+//! Least and greatest heights under any part of a map, from which boxes around a displaced surface are made.
 
 use glam::DVec2;
 use ndfmap_core::grid::Size;

@@ -33,7 +33,7 @@ const LEAST_GROUP: u16 = 4;
 /// Most groups, but for one a base triangle: some 200 MB of boxes and hierarchy.
 const MOST_GROUPS: usize = 1 << 21;
 
-/// Meshes of a scene that have relief, ready to be hit.
+/// Meshes of a scene that are displaced, ready to be hit.
 pub struct DisplacedMeshes {
     pieces: Vec<Piece>,
     groups: Vec<Group>,
@@ -203,7 +203,7 @@ impl Base<'_> {
 }
 
 impl DisplacedMeshes {
-    /// Puts boxes around the meshes of a scene that have relief.
+    /// Puts boxes around the displaced meshes of a scene.
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
         let mut shared: Vec<Option<Arc<Extremes>>> = vec![None; scene.materials.len()];

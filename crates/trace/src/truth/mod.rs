@@ -93,7 +93,7 @@ impl<'a> Truth<'a> {
         }
     }
 
-    /// Reads the maps of a displaced scene: rays hit meshes with relief by the facets of `displacement`, and
+    /// Reads the maps of a displaced scene: rays hit displaced meshes by the facets of `displacement`, and
     /// those without by `geometry`.
     #[must_use]
     pub fn displaced(scene: &'a Scene, geometry: &'a Geometry, displacement: &'a DisplacedMeshes) -> Self {
@@ -245,7 +245,7 @@ impl<'a> Truth<'a> {
         }
     }
 
-    /// Light that a facet of relief sends to the eye, with the surface parameters of the texel `displaced`
+    /// Light that a displaced facet sends to the eye, with the surface parameters of the texel `displaced`
     /// from it. Where facets shade each other, a light that is hidden from the facet adds nothing.
     fn shade_facet(&self, facet: &Facet, eye: DVec3, (displaced, numbers): (DVec2, Numbers)) -> DVec3 {
         let finest = &self.materials[facet.material];
