@@ -166,8 +166,8 @@ impl Device {
     }
 
     /// Runs the entry point `main` of a compute shader, of 64 invocations a group, once for each of `count`:
-    /// binding 0 is read, 1 is written. The shader counts invocations by `id.x + id.y * ROW`. For tests of
-    /// twins.
+    /// binding 0 is read, 1 is written. Invocations count in rows of as many as a row of groups has. For
+    /// tests of twins.
     ///
     /// # Errors
     /// [`GpuError`] that the driver raises, for an invalid shader too.

@@ -14,8 +14,8 @@ use obvhs::ray::{Ray, RayHit};
 pub struct Geometry {
     /// Corners, object, in the order of the scene.
     triangles: Vec<Triangle>,
-    /// Matrices that take slopes of maps to the surface, at each triangle's corners; none in a scene without
-    /// relief.
+    /// Matrices that take slopes of maps to the surface, at each triangle's corners; none in a scene
+    /// without displacement.
     stretches: Vec<[Mat2; 3]>,
     /// `None` for a scene without triangles.
     hierarchy: Option<CwBvh>,

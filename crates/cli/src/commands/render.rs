@@ -317,7 +317,7 @@ impl Render {
             picture_writer(path).map_err(|e| Error::Request(e.to_string()))?;
         }
         if let Some(sheet) = &self.compare
-            && !matches!(picture_writer(sheet), Ok(WritePicture::Display(_)))
+            && !sheet.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"))
         {
             return Err(Error::Request(format!("{}: contact sheets are written as .png", sheet.display())));
         }

@@ -24,7 +24,7 @@ fn mean_of_positive_part(mean: f32, variance: f32) -> f32 {
 }
 
 // A_1 = coth kappa - 1/kappa: where the two are near each other, by its series, to 2e-9 at one half. (By
-// `exp`: nothing bounds what devices make of `tanh`.)
+// `exp`: a device may be 1e-5 off with `tanh`.)
 fn mean_cosine(kappa: f32) -> f32 {
     let k2 = kappa * kappa;
     if kappa < 0.5 {

@@ -68,7 +68,8 @@ fn slope_hash(v: u32) -> u32 {
 }
 
 // Point of the unit circle after `turns` from its first axis: the sine and the cosine of the angle to the
-// nearest axis by their series, to 2e-9, as devices' own may be off by 2^-11.
+// nearest axis by their series, to 2e-9, as a device's own may be off by 2^-11, and by
+// anything beyond half a turn.
 fn circle_point(turns: f32) -> vec2<f32> {
     let quarter = round(4.0 * turns);
     let a = 0.5 * PI * (4.0 * turns - quarter);

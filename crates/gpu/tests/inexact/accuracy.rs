@@ -12,6 +12,8 @@ pub(super) const ULP: f32 = f32::EPSILON;
 pub(super) enum Error {
     /// So many units in the last place.
     Ulps(f32),
+    /// This much, whatever the result.
+    Absolute(f32),
     /// 3 + 2 |x| units, of the function of x.
     Exponential,
     /// 2^-21 where the result is nearer to zero than this, and 3 units elsewhere.
@@ -46,17 +48,21 @@ pub(super) fn error_of(operation: &Expression) -> Option<Error> {
             MathFunction::InverseSqrt => Error::Ulps(2.0),
             // 1 / inverseSqrt(x).
             MathFunction::Sqrt => Error::Ulps(4.5),
-            // sqrt(dot(x, x)), where halving makes 1.5 of the 3 units of a sum of four squares.
+            // sqrt(dot(x, x)), where halving makes 1.5 of the 3 units of a sum of three squares.
             MathFunction::Length => Error::Ulps(6.0),
             MathFunction::Distance => Error::Ulps(7.0),
             // x / length(x).
             MathFunction::Normalize => Error::Ulps(8.5),
-            MathFunction::Acos | MathFunction::Atan2 => Error::Ulps(4096.0),
+            MathFunction::Atan2 => Error::Ulps(4096.0),
+            MathFunction::Acos => Error::Absolute(6.77e-5),
             MathFunction::Exp | MathFunction::Exp2 => Error::Exponential,
             MathFunction::Log => Error::Logarithm(std::f32::consts::LN_2),
             MathFunction::Log2 => Error::Logarithm(1.0),
             other => unreachable!("no row for {other:?}"),
         },
+        Expression::Derivative { .. } => unreachable!("nothing bounds a derivative"),
+        // Access, selection, negation, conversion from integers: nothing is computed that is not exact, or
+        // (of whole numbers beyond 2²⁴, which no shader of ours has) correctly rounded.
         _ => return None,
     })
 }

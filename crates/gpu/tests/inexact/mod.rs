@@ -1,7 +1,8 @@
 //! Devices as inexact as the standard allows: shaders whose every operation is off by as much as it may be.
 //!
 //! `accuracy.rs` says how much that is. Two sound devices may differ by as much as a result changes when all
-//! operations err, each up or down at random.
+//! operations err, each up or down at random. The standard allows more that is not here: sums in another
+//! order, subnormal numbers as 0, and interpolation and mixing in filters of no bounded precision.
 
 mod accuracy;
 
@@ -20,6 +21,9 @@ use rand_pcg::Pcg64Mcg;
 /// Places of a filter between one texel and the next: Direct3D's eight bits, which all desktop devices
 /// report. (Vulkan is content with four.)
 const FILTER_STEPS: f32 = 256.0;
+
+/// Size of exponents beyond which a single float is 0 or infinite, to the base e and 2.
+const LARGEST_EXPONENT: f32 = 160.0;
 
 /// Shader whose operations all err by as much as they may, each up or down by its own toss of a coin, as on
 /// the inexact device of this number.
@@ -51,7 +55,7 @@ enum Kind {
     Scalar,
     Vector(VectorSize),
     SquareMatrix(VectorSize),
-    /// No floats, or many.
+    /// No float, vector or square matrix of floats: what is computed of it is exact.
     Other,
 }
 
@@ -61,6 +65,7 @@ impl Kind {
             TypeInner::Scalar(scalar) if scalar.kind == ScalarKind::Float => Self::Scalar,
             TypeInner::Vector { size, scalar } if scalar.kind == ScalarKind::Float => Self::Vector(*size),
             TypeInner::Matrix { columns, rows, .. } if columns == rows => Self::SquareMatrix(*columns),
+            TypeInner::Matrix { .. } => unreachable!("no shader of ours has a matrix that is not square"),
             _ => Self::Other,
         }
     }
@@ -85,11 +90,10 @@ struct Rewrite<'a> {
 /// Rewrites a function whose expressions are of these kinds.
 fn rewrite(function: &mut Function, kinds: &[Kind], types: &mut UniqueArena<Type>, coins: &mut Pcg64Mcg) {
     let mut new = Rewrite { expressions: Arena::new(), literals: HashMap::new(), types, coins };
-    let units = [1.0, 2.0, 2.5, 3.0, 4.5, 6.0, 7.0, 8.5, 4096.0].map(|units| units * ULP);
-    let around_one = units.iter().flat_map(|e| [1.0 + e, 1.0 - e]);
-    let absolute = [4.0 * ULP, 3.0 * ULP, 2.0 * ULP];
-    let around_zero = absolute.iter().flat_map(|e| [*e, -e]);
-    for number in around_one.chain(around_zero).chain([FILTER_STEPS, 0.0, 1.0, std::f32::consts::LN_2]) {
+    let units = [1.0, 2.0, 2.5, 3.0, 4.0, 4.5, 6.0, 7.0, 8.5, 4096.0].map(|units| units * ULP);
+    let errors = units.into_iter().chain([6.77e-5]).flat_map(|e| [e, -e]);
+    let others = [FILTER_STEPS, LARGEST_EXPONENT, 0.0, 1.0, std::f32::consts::LN_2];
+    for number in errors.chain([1.0 + 2.0 * ULP, 1.0 - 2.0 * ULP]).chain(others) {
         let literal = new.push(Expression::Literal(Literal::F32(number)));
         new.literals.insert(number.to_bits(), literal);
     }
@@ -124,15 +128,10 @@ impl Rewrite<'_> {
         self.literals[&number.to_bits()]
     }
 
-    /// Number that is off by this much, up or down by a coin.
-    fn toss(&mut self, around: f32, by: f32) -> Handle<Expression> {
-        let number = if self.coins.random() { around + by } else { around - by };
-        self.literal(number)
-    }
-
-    /// Factor that is so many units above or below one.
-    fn factor(&mut self, units: f32) -> Handle<Expression> {
-        self.toss(1.0, units * ULP)
+    /// Error of this much, up or down by a coin.
+    fn toss(&mut self, by: f32) -> Handle<Expression> {
+        let by = if self.coins.random() { by } else { -by };
+        self.literal(by)
     }
 
     /// Scalar in each component of a kind.
@@ -180,8 +179,14 @@ impl Rewrite<'_> {
             (
                 Expression::Binary { op: BinaryOperator::Multiply, left: matrix, right: from },
                 Expression::Binary { right, .. },
-            ) if matches!(kind_of(*matrix), Kind::SquareMatrix(_)) => {
+            ) if matches!(kind_of(*matrix), Kind::SquareMatrix(_)) && kind_of(*from) != Kind::Scalar => {
                 *right = self.loosen(*right, kind_of(*from));
+            }
+            (
+                Expression::Binary { op: BinaryOperator::Multiply, left: from, right: matrix },
+                Expression::Binary { left, .. },
+            ) if matches!(kind_of(*matrix), Kind::SquareMatrix(_)) && kind_of(*from) != Kind::Scalar => {
+                *left = self.loosen(*left, kind_of(*from));
             }
             _ => {}
         }
@@ -190,19 +195,32 @@ impl Rewrite<'_> {
         match error {
             None => {}
             Some(Error::Ulps(units)) => {
-                let factor = self.factor(units);
-                self.binary(BinaryOperator::Multiply, exact, factor);
+                // A sum, for a factor above one would round units to whole ones.
+                let share = self.toss(units * ULP);
+                let error = self.binary(BinaryOperator::Multiply, exact, share);
+                self.binary(BinaryOperator::Add, exact, error);
+            }
+            Some(Error::Absolute(by)) => {
+                let by = self.toss(by);
+                let by = self.splat(by, kind);
+                self.binary(BinaryOperator::Add, exact, by);
             }
             Some(Error::Exponential) => {
-                let (fixed, per_x) = (self.factor(3.0), self.toss(0.0, 2.0 * ULP));
-                let x = self.math(MathFunction::Abs, argument.unwrap());
+                let (fixed, per_x) = (self.toss(3.0 * ULP), self.toss(2.0 * ULP));
+                let (x, most) =
+                    (self.math(MathFunction::Abs, argument.unwrap()), self.literal(LARGEST_EXPONENT));
+                // The exponential of what is larger is 0 or infinite on any device.
+                let most = self.splat(most, kind);
+                let (fun, arg1) = (MathFunction::Min, Some(most));
+                let x = self.push(Expression::Math { fun, arg: x, arg1, arg2: None, arg3: None });
                 let more = self.binary(BinaryOperator::Multiply, x, per_x);
                 let fixed = self.splat(fixed, kind);
-                let factor = self.binary(BinaryOperator::Add, fixed, more);
-                self.binary(BinaryOperator::Multiply, exact, factor);
+                let share = self.binary(BinaryOperator::Add, fixed, more);
+                let error = self.binary(BinaryOperator::Multiply, exact, share);
+                self.binary(BinaryOperator::Add, exact, error);
             }
             Some(Error::Logarithm(within)) => {
-                let (near, units) = (self.toss(0.0, 4.0 * ULP), self.toss(0.0, 3.0 * ULP));
+                let (near, units) = (self.toss(4.0 * ULP), self.toss(3.0 * ULP));
                 let accept = self.splat(near, kind);
                 let reject = self.binary(BinaryOperator::Multiply, exact, units);
                 let (size, within) = (self.math(MathFunction::Abs, exact), self.literal(within));
@@ -221,7 +239,10 @@ impl Rewrite<'_> {
     /// Argument of a sum of products, its components off by two units each: they stand for the roundings of
     /// the terms, which are no share of the sum where terms cancel.
     fn loosen(&mut self, argument: Handle<Expression>, kind: Kind) -> Handle<Expression> {
-        let factor = |new: &mut Self| new.factor(2.0);
+        let factor = |new: &mut Self| {
+            let factor = if new.coins.random() { 1.0 + 2.0 * ULP } else { 1.0 - 2.0 * ULP };
+            new.literal(factor)
+        };
         let factors = match kind {
             Kind::Scalar => factor(self),
             Kind::Vector(size) => {

@@ -167,9 +167,9 @@ pub fn to_write(path: &Path) -> Result<&'static Format, MapError> {
 /// [`MapError`] for a name of no format that pictures are written in.
 pub fn picture_writer(path: &Path) -> Result<WritePicture, MapError> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let mut writers = TABLE.iter().filter_map(|f| Some((f.extensions[0], f.write_picture?)));
-    writers.clone().find(|(usual, _)| *usual == extension).map(|(_, writer)| writer).ok_or_else(|| {
-        let names: Vec<String> = writers.by_ref().map(|(usual, _)| format!(".{usual}")).collect();
+    let writers = || TABLE.iter().filter_map(|f| Some((f.extensions[0], f.write_picture?)));
+    writers().find(|(usual, _)| *usual == extension).map(|(_, writer)| writer).ok_or_else(|| {
+        let names: Vec<String> = writers().map(|(usual, _)| format!(".{usual}")).collect();
         MapError::unsupported(path, format!("pictures are written as {}", names.join(" or ")))
     })
 }

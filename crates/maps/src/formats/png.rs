@@ -31,8 +31,8 @@ pub fn encode(pixels: &[[u8; 3]], size: Size) -> EncodedPicture {
     let encode = || {
         let mut bytes = Vec::new();
         let mut encoder = ::png::Encoder::new(&mut bytes, size.width as u32, size.height as u32);
-        encoder.set_color(::png::ColorType::Rgb);
-        encoder.set_depth(::png::BitDepth::Eight);
+        encoder.set_color(ColorType::Rgb);
+        encoder.set_depth(BitDepth::Eight);
         let mut writer = encoder.write_header()?;
         writer.write_image_data(pixels.as_flattened())?;
         writer.finish()?;

@@ -94,7 +94,7 @@ impl<'a> Truth<'a> {
     }
 
     /// Reads the maps of a displaced scene: rays hit displaced meshes by the facets of `displacement`, and
-    /// those without by `geometry`.
+    /// the others by `geometry`.
     #[must_use]
     pub fn displaced(scene: &'a Scene, geometry: &'a Geometry, displacement: &'a DisplacedMeshes) -> Self {
         Self { displacement: Some(displacement), ..Self::new(scene, geometry) }
