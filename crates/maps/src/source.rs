@@ -221,6 +221,61 @@ fn height_field(
     Ok(HeightField { heights, wraps: options.wraps, filter: options.slope_filter })
 }
 
+/// Alpha and green as x and y, where red is full everywhere and alpha is not the same everywhere: no normals
+/// of a surface all point along x, but DXT5nm has its x in alpha.
+fn unswizzled(image: &Image) -> Option<Image> {
+    let sample = |i: usize, c: usize| image.samples.get(i * image.channels + c);
+    let mut texels = 0..image.size.area();
+    if image.channels != 4
+        || !texels.clone().all(|i| sample(i, 0) == 1.0)
+        || texels.all(|i| sample(i, 3) == sample(0, 3))
+    {
+        return None;
+    }
+    let order = (0..image.size.area()).flat_map(|i| [4 * i + 3, 4 * i + 1]);
+    let samples = match &image.samples {
+        Samples::U8(v) => Samples::U8(order.map(|i| v[i]).collect()),
+        Samples::U16(v) => Samples::U16(order.map(|i| v[i]).collect()),
+        Samples::F32(v) => Samples::F32(order.map(|i| v[i]).collect()),
+    };
+    Some(Image { size: image.size, channels: 2, samples, warnings: image.warnings.clone() })
+}
+
+/// Texels that tell what a picture holds: more would tell no more.
+const WITNESSES: usize = 1 << 16;
+
+/// Share of texels whose vectors have length one, to a tenth: more than 8 bits and JPEG move it. Black texels
+/// and those that are not finite do not count.
+fn unit_share(image: &Image, positive: bool) -> f64 {
+    let (mut unit, mut all) = (0_usize, 0_usize);
+    // An odd step goes over all columns.
+    for i in (0..image.size.area()).step_by((image.size.area() / WITNESSES) | 1) {
+        let stored = Vec3::from_array([0, 1, 2].map(|c| image.samples.get(i * image.channels + c)));
+        if stored == Vec3::ZERO || !stored.is_finite() {
+            continue;
+        }
+        let vector = if positive { 2.0 * stored - 1.0 } else { stored };
+        all += 1;
+        unit += usize::from((vector.length() - 1.0).abs() < 0.1);
+    }
+    if all == 0 { 1.0 } else { unit as f64 / all as f64 }
+}
+
+/// True where stored values are the components themselves, from -1 to 1; else they run from 0 to 1. Floats
+/// may be either: the decoding that makes more vectors of length one is right. Without z, values from 0 to 1
+/// lie around a half, and components around 0.
+fn is_signed(image: &Image, two_channels: bool) -> bool {
+    let Samples::F32(values) = &image.samples else { return false };
+    if two_channels {
+        let xy = values.chunks_exact(image.channels).flat_map(|texel| &texel[..2]);
+        let (sum, count) =
+            xy.filter(|v| v.is_finite()).fold((0.0, 0), |(s, n), v| (s + f64::from(*v), n + 1));
+        return sum < 0.25 * f64::from(count);
+    }
+    let (signed, positive) = (unit_share(image, false), unit_share(image, true));
+    signed > positive || signed == positive && values.iter().any(|v| *v < 0.0)
+}
+
 /// A normal map in the precision of its file, decoded a row at a time.
 struct EncodedNormals {
     image: Image,
@@ -246,27 +301,36 @@ impl EncodedNormals {
                 "has one channel: no normal map. `--from height` takes it as heights",
             ));
         }
+        let image = match unswizzled(&image) {
+            Some(xy) => {
+                warnings.push("is full in red: x is taken from alpha and y from green (DXT5nm)".to_owned());
+                xy
+            }
+            None => image,
+        };
         let texels = || 0..image.size.area();
         let sample = |i: usize, c: usize| image.samples.get(i * image.channels + c);
         let no_blue = image.channels > 2 && texels().all(|i| sample(i, 2) == 0.0);
         if no_blue {
             warnings.push("has no blue: z is rebuilt from red and green".to_owned());
         }
-        let positive = match &image.samples {
-            Samples::F32(values) => !values.iter().any(|v| *v < 0.0),
-            _ => true,
-        };
+        let two_channels = image.channels == 2 || no_blue;
+        let positive = !is_signed(&image, two_channels);
+        if !two_channels {
+            let share = unit_share(&image, positive);
+            if share < 0.5 {
+                warnings.push(format!(
+                    "holds few vectors of length one ({:.0} %): no tangent-space normal map, or blue is not z, or \
+                     the channels are in another order",
+                    100.0 * share
+                ));
+            }
+        }
         let green = match options.convention {
             Convention::OpenGl => 1.0,
             Convention::DirectX => -1.0,
         };
-        let normals = Self {
-            two_channels: image.channels == 2 || no_blue,
-            wraps: options.wraps,
-            positive,
-            green,
-            image,
-        };
+        let normals = Self { two_channels, wraps: options.wraps, positive, green, image };
         normals.check_normals(options.convention, warnings);
         Ok(normals)
     }

@@ -14,7 +14,8 @@ pub(super) struct Capacity {
     pub(super) texels_per_byte: usize,
 }
 
-/// Decodes a picture of 8-bit grey, RGB or RGBA.
+/// Decodes a picture of 8-bit grey, RGB or either with alpha. Alpha beside grey is left out, for two channels
+/// are those of a normal.
 pub(super) fn read_integers(
     path: &Path,
     decoder: impl ImageDecoder,
@@ -22,6 +23,7 @@ pub(super) fn read_integers(
 ) -> Result<Image, MapError> {
     let channels = match decoder.color_type() {
         ColorType::L8 => 1,
+        ColorType::La8 => 2,
         ColorType::Rgb8 => 3,
         ColorType::Rgba8 => 4,
         other => {
@@ -30,7 +32,8 @@ pub(super) fn read_integers(
         }
     };
     let (size, buffer) = decode(path, decoder, capacity)?;
-    Image::new(path, size, channels, Samples::U8(buffer))
+    let image = Image::new(path, size, channels, Samples::U8(buffer))?;
+    Ok(if channels == 2 { image.first_channels(1) } else { image })
 }
 
 /// All bytes of a picture, its size checked first: against the bounds, and against what the file can hold.

@@ -113,30 +113,115 @@ fn read_image(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
     }
     let image = guarded(path, || {
         let reader = read().no_deep_data().largest_resolution_level().all_channels();
-        reader.first_valid_layer().all_attributes().from_buffered(Cursor::new(bytes))
+        reader.all_layers().all_attributes().from_buffered(Cursor::new(bytes))
     })?;
-    let layer = image.layer_data;
-    let size = check_size(path, layer.size.width(), layer.size.height())?;
-    let named = |names: &[&str]| -> Option<Vec<&AnyChannel<FlatSamples>>> {
-        let find = |name: &&str| layer.channel_data.list.iter().find(|c| c.name.eq_case_insensitive(name));
-        names.iter().map(find).collect()
-    };
-    let chosen = named(&["R", "G", "B"])
-        .or_else(|| named(&["X", "Y", "Z"]))
-        .or_else(|| named(&["R", "G"]))
-        .or_else(|| named(&["Y"]))
-        .or_else(|| layer.channel_data.list.first().map(|c| vec![c]));
-    let Some(chosen) = chosen else { return Err(MapError::unsupported(path, "has no channels")) };
-    if chosen.iter().any(|c| c.sampling != Vec2(1, 1)) {
+    let parts: Vec<&[AnyChannel<FlatSamples>]> =
+        image.layer_data.iter().map(|part| &part.channel_data.list[..]).collect();
+    let choice = choose_channels(path, &parts)?;
+    let part = &image.layer_data[choice.part];
+    let size = check_size(path, part.size.width(), part.size.height())?;
+    if choice.channels.iter().any(|c| c.sampling != Vec2(1, 1)) {
         return Err(MapError::unsupported(path, "has subsampled channels; full resolution is read"));
     }
-    let mut samples = vec![0.0; size.area() * chosen.len()];
-    for (at, channel) in chosen.iter().enumerate() {
+    let channels = choice.channels.len();
+    let mut samples = vec![0.0; size.area() * channels];
+    for (at, channel) in choice.channels.iter().enumerate() {
         for (i, value) in channel.sample_data.values_as_f32().enumerate() {
-            samples[i * chosen.len() + at] = value;
+            samples[i * channels + at] = value;
         }
     }
-    Image::new(path, size, chosen.len(), Samples::F32(samples))
+    let window = image.attributes.display_window;
+    let frame = check_size(path, window.size.width(), window.size.height())?;
+    let (own, display) = (part.attributes.layer_position, window.position);
+    let place = [own.x().saturating_sub(display.x()), own.y().saturating_sub(display.y())];
+    let mut picture = Image::new(path, size, channels, Samples::F32(samples))?;
+    if (frame, place) != (size, [0, 0]) {
+        picture = picture.within(frame, place);
+        let (w, h) = (size.width, size.height);
+        let reason = format!("holds {w} × {h} of {} × {} texels; the rest is 0", frame.width, frame.height);
+        picture.warnings.push(reason);
+    }
+    picture.warnings.extend(choice.warning);
+    Ok(picture)
+}
+
+/// Channels of one layer that make up a picture.
+struct Choice<'a> {
+    part: usize,
+    channels: Vec<&'a AnyChannel<FlatSamples>>,
+    /// Name of the layer, where the file has no plain channels.
+    warning: Option<String>,
+}
+
+/// Names of a picture's channels, in the order in which they are looked for: colours, then vectors.
+const COLOURS_AND_VECTORS: [&[&str]; 4] =
+    [&["R", "G", "B"], &["X", "Y", "Z"], &["NX", "NY", "NZ"], &["RED", "GREEN", "BLUE"]];
+
+/// Chooses the channels of a picture: the plain ones of the first part (R, G, B; X, Y, Z; ...), else those of
+/// the only layer that has such a set, else R and G, else the only channel that is no alpha.
+///
+/// # Errors
+/// [`MapError`] that lists the channels, where there are several layers to choose from.
+fn choose_channels<'a>(path: &Path, parts: &[&'a [AnyChannel<FlatSamples>]]) -> Result<Choice<'a>, MapError> {
+    let mut layers: Vec<(usize, String)> = Vec::new();
+    for (part, channels) in parts.iter().enumerate() {
+        for channel in channels.iter() {
+            let layer = (part, layer_and_name(channel).0);
+            if !layers.contains(&layer) {
+                layers.push(layer);
+            }
+        }
+    }
+    let set = |(part, layer): &(usize, String), names: &[&str]| -> Option<Vec<&'a AnyChannel<FlatSamples>>> {
+        let find = |name: &&str| {
+            parts[*part].iter().find(|c| layer_and_name(c) == (layer.clone(), (*name).to_owned()))
+        };
+        names.iter().map(find).collect()
+    };
+    let triple = |layer: &(usize, String)| COLOURS_AND_VECTORS.iter().find_map(|names| set(layer, names));
+    let plain = (0, String::new());
+    if let Some(channels) = triple(&plain) {
+        return Ok(Choice { part: 0, channels, warning: None });
+    }
+    let mut found: Vec<_> = layers.iter().filter_map(|layer| Some((layer, triple(layer)?))).collect();
+    if let (Some(channels), true) = (set(&plain, &["R", "G"]), found.is_empty()) {
+        return Ok(Choice { part: 0, channels, warning: None });
+    }
+    if found.is_empty() {
+        let alpha = |c: &AnyChannel<FlatSamples>| matches!(layer_and_name(c).1.as_str(), "A" | "ALPHA");
+        for layer in &layers {
+            let single = parts[layer.0].iter().filter(|c| layer_and_name(c).0 == layer.1 && !alpha(c));
+            found.extend(single.map(|c| (layer, vec![c])));
+        }
+    }
+    let names = || {
+        let all = parts.iter().flat_map(|channels| channels.iter().map(|c| c.name.to_string()));
+        all.collect::<Vec<_>>().join(", ")
+    };
+    match &found[..] {
+        [(layer, channels)] => {
+            let named = !layer.1.is_empty() || layer.0 > 0;
+            let warning = named.then(|| {
+                let taken: Vec<String> = channels.iter().map(|c| c.name.to_string()).collect();
+                format!("has layers: {} are taken", taken.join(", "))
+            });
+            Ok(Choice { part: layer.0, channels: channels.clone(), warning })
+        }
+        [] => Err(MapError::unsupported(path, format!("has no channels of a picture, only {}", names()))),
+        _ => {
+            let reason = format!("has several layers; save the one to read alone. Channels: {}", names());
+            Err(MapError::unsupported(path, reason))
+        }
+    }
+}
+
+/// Layer and name of a channel, `Layer.Name`, the name in capitals.
+fn layer_and_name(channel: &AnyChannel<FlatSamples>) -> (String, String) {
+    let name = channel.name.to_string();
+    match name.rsplit_once('.') {
+        Some((layer, name)) => (layer.to_owned(), name.to_uppercase()),
+        None => (String::new(), name.to_uppercase()),
+    }
 }
 
 fn read_ndf(path: &Path, bytes: &[u8]) -> Result<Option<NdfMap>, MapError> {
