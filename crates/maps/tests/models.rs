@@ -212,3 +212,127 @@ fn a_map_of_ones_own_leaves_the_mean_colour() {
     // Half red, half blue, of metalness 0.25.
     assert!((params.diffuse - DVec3::new(0.375, 0.0, 0.375)).length() < 1e-5, "{params:?}");
 }
+
+/// The square of [`gltf`] with its JSON changed.
+fn changed(change: impl FnOnce(&mut serde_json::Value)) -> Vec<u8> {
+    let mut json: serde_json::Value = serde_json::from_slice(&gltf()).unwrap();
+    change(&mut json);
+    json.to_string().into_bytes()
+}
+
+#[test]
+fn strips_and_fans_are_the_same_square() {
+    let (list, _) = read("a.gltf", &gltf()).unwrap();
+    let corners = |scene: &ndfmap_scene::Scene| {
+        let mesh = &scene.objects[0].mesh;
+        let place = |i: u32| mesh.vertices[i as usize].position;
+        let area = |t: &[u32; 3]| (place(t[1]) - place(t[0])).cross(place(t[2]) - place(t[0])) / 2.0;
+        mesh.triangles.iter().map(area).sum::<Vec3>()
+    };
+    // Indices as little-endian words: a strip in zigzag, and a fan round the first corner.
+    for (mode, indices) in [(5, [0_u16, 1, 3, 2]), (6, [0, 1, 2, 3])] {
+        let bytes = changed(|json| {
+            use base64::Engine;
+            use base64::engine::general_purpose::STANDARD;
+            let data: Vec<u8> = indices.iter().flat_map(|i| i.to_le_bytes()).collect();
+            let uri = format!("data:application/octet-stream;base64,{}", STANDARD.encode(&data));
+            let length = serde_json::json!({ "byteLength": 8, "uri": uri });
+            json["buffers"].as_array_mut().unwrap().push(length);
+            let view = serde_json::json!({ "buffer": 1, "byteLength": 8 });
+            let at = json["bufferViews"].as_array().unwrap().len();
+            json["bufferViews"].as_array_mut().unwrap().push(view);
+            json["accessors"][2]["bufferView"] = at.into();
+            json["accessors"][2]["count"] = 4.into();
+            json["meshes"][0]["primitives"][0]["mode"] = mode.into();
+        });
+        let (scene, warnings) = read("a.gltf", &bytes).unwrap();
+        assert_eq!(warnings, [] as [&str; 0], "{mode}");
+        assert_eq!(scene.objects[0].mesh.triangles.len(), 2, "{mode}");
+        assert!((corners(&scene) - corners(&list)).length() < 1e-6, "{mode}: {}", corners(&scene));
+    }
+}
+
+#[test]
+fn what_is_not_read_is_refused_by_its_name() {
+    let required = |name: &str| changed(|json| json["extensionsRequired"] = serde_json::json!([name]));
+    let version = changed(|json| json["asset"]["version"] = "1.0".into());
+    let binary = [b"glTF".as_slice(), &1_u32.to_le_bytes(), &[0; 12]].concat();
+    for (bytes, reason) in [
+        (required("KHR_draco_mesh_compression"), "requires KHR_draco_mesh_compression"),
+        (required("EXT_texture_webp"), "requires EXT_texture_webp"),
+        (version, "glTF 1.0"),
+        (binary, "glTF 1.0"),
+    ] {
+        let error = read("a.gltf", &bytes).err().unwrap().to_string();
+        assert!(error.starts_with("a.gltf: ") && error.contains(reason), "{error}");
+    }
+}
+
+#[test]
+fn a_grey_picture_is_grey_in_every_colour() {
+    // The base colour is put where the normal map's picture is, and a grey PNG in its place.
+    let mut png = Vec::new();
+    let mut encoder = png::Encoder::new(&mut png, 1, 1);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.write_header().unwrap().write_image_data(&[128]).unwrap();
+    let bytes = changed(|json| {
+        use base64::Engine;
+        let data = base64::engine::general_purpose::STANDARD.encode(&png);
+        json["images"][1] = serde_json::json!({ "uri": format!("data:image/png;base64,{data}") });
+    });
+    let (scene, _) = read("a.gltf", &bytes).unwrap();
+    let map = scene.materials[scene.objects[0].material].textures.as_ref().unwrap();
+    let [r, g, b, _] = map.diffuse_roughness.row(0)[0];
+    // sRGB 128 is 0.2159 of linear light; three quarters of it is diffuse.
+    assert!((r - 0.75 * 0.2159).abs() < 1e-4 && r == g && g == b, "{r} {g} {b}");
+}
+
+#[test]
+fn colours_without_a_normal_map_lie_by_their_own_transform() {
+    let (plain, _) = read("a.gltf", &gltf()).unwrap();
+    let bytes = changed(|json| {
+        let material = &mut json["materials"][0];
+        material.as_object_mut().unwrap().remove("normalTexture");
+        let transform =
+            serde_json::json!({ "KHR_texture_transform": { "offset": [0.5, 0.25], "scale": [2, 1] } });
+        material["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = transform;
+        json["samplers"] = serde_json::json!([{ "wrapS": 33071, "wrapT": 33071 }]);
+        json["textures"][1]["sampler"] = 0.into();
+        json["extensionsUsed"] = serde_json::json!(["KHR_texture_transform"]);
+    });
+    let (moved, warnings) = read("a.gltf", &bytes).unwrap();
+    assert_eq!(warnings, [] as [&str; 0]);
+    for (a, b) in plain.objects[0].mesh.vertices.iter().zip(&moved.objects[0].mesh.vertices) {
+        assert!(
+            (a.uv * Vec2::new(2.0, 1.0) + Vec2::new(0.5, 0.25) - b.uv).length() < 1e-6,
+            "{} {}",
+            a.uv,
+            b.uv
+        );
+    }
+    let MaterialMap::Surface(surface) = &moved.materials[0].map else { panic!("a surface") };
+    assert_eq!(surface.wraps().x, ndfmap_core::surface::Wrap::Clamp);
+}
+
+#[test]
+fn what_is_laid_on_otherwise_or_left_out_is_said() {
+    let warned = |change: fn(&mut serde_json::Value), reason: &str| {
+        let (_, warnings) = read("a.gltf", &changed(change)).unwrap();
+        assert!(warnings.iter().any(|w| w.contains(reason)), "{reason}: {warnings:?}");
+    };
+    let other = |json: &mut serde_json::Value| {
+        let extension = serde_json::json!({ "KHR_texture_transform": { "offset": [0.5, 0] } });
+        json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = extension;
+    };
+    warned(other, "lie otherwise than its normal map");
+    let mirrored = |json: &mut serde_json::Value| {
+        json["samplers"] = serde_json::json!([{ "wrapS": 33648, "wrapT": 10497 }]);
+        json["textures"][0]["sampler"] = 0.into();
+        json["textures"][1]["sampler"] = 0.into();
+    };
+    warned(mirrored, "are mirrored");
+    let coloured = |json: &mut serde_json::Value| {
+        json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 0.into();
+    };
+    warned(coloured, "colours of vertices");
+}

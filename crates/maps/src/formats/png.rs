@@ -80,17 +80,6 @@ fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
         _ => Samples::U8(buffer),
     };
     // Grey with alpha is a grey picture: alpha means nothing to a height map.
-    if channels == 2 {
-        Image::new(path, size, 1, first_of_two(samples))
-    } else {
-        Image::new(path, size, channels, samples)
-    }
-}
-
-fn first_of_two(samples: Samples) -> Samples {
-    match samples {
-        Samples::U8(v) => Samples::U8(v.into_iter().step_by(2).collect()),
-        Samples::U16(v) => Samples::U16(v.into_iter().step_by(2).collect()),
-        Samples::F32(v) => Samples::F32(v.into_iter().step_by(2).collect()),
-    }
+    let image = Image::new(path, size, channels, samples)?;
+    Ok(if channels == 2 { image.first_channels(1) } else { image })
 }

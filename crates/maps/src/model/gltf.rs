@@ -2,8 +2,8 @@
 //!
 //! It reads positions, normals, tangents, the normal texture's coordinates (with `KHR_texture_transform` and
 //! scale), base colour, metalness and roughness, factors and textures. Colours and roughness are averaged
-//! over the texels of the normal map. It does not read animation, skins, morphs, occlusion, emission, alpha,
-//! cameras and lights.
+//! over the texels of the normal map; without one, the colours' own coordinates and transform count. It does
+//! not read animation, skins, morphs, colours of vertices, occlusion, emission, alpha, cameras and lights.
 
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -16,11 +16,11 @@ use glam::{DVec3, Mat3, Mat4, Vec2, Vec3, Vec4};
 use ndfmap_core::brdf::SurfaceParams;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::lookup::area_mean;
-use ndfmap_core::surface::{Surface, SurfaceRow, Wrap, Wraps, unit_or_up};
+use ndfmap_core::surface::{NormalGrid, Surface, SurfaceRow, Wrap, Wraps, unit_or_up};
 use ndfmap_core::units::{Alpha, PerceptualRoughness, SlopeVariance};
 use ndfmap_scene::{Material, SurfaceTextures};
 
-use super::{MAX_ELEMENTS, ModelFormat, Parts, RawMesh, flat, microfacets};
+use super::{MAX_ELEMENTS, ModelFormat, Parts, RawMesh, microfacets};
 use crate::attribute::{Transfer, attribute_of_image};
 use crate::formats::{read_file, read_image};
 use crate::source::{SourceOptions, source_of_image};
@@ -36,6 +36,7 @@ const LEAST_ROUGHNESS: f64 = 0.05;
 const MAX_DEPTH: usize = 64;
 
 fn read(path: &Path, bytes: &[u8], warnings: &mut Vec<String>) -> Result<Parts, MapError> {
+    refuse_unread(path, bytes)?;
     let document = gltf::Gltf::from_slice(bytes).map_err(|e| MapError::invalid(path, e))?;
     let buffers = document
         .buffers()
@@ -61,6 +62,7 @@ fn read(path: &Path, bytes: &[u8], warnings: &mut Vec<String>) -> Result<Parts, 
         seen: HashSet::new(),
         elements: 0,
         left_out: 0,
+        coloured: false,
     };
     let scene = document.default_scene().or_else(|| document.scenes().next());
     for node in scene.iter().flat_map(gltf::Scene::nodes) {
@@ -70,13 +72,44 @@ fn read(path: &Path, bytes: &[u8], warnings: &mut Vec<String>) -> Result<Parts, 
         warnings.push("is animated: only the pose of the file is shown".to_owned());
     }
     if walk.left_out > 0 {
-        warnings.push(format!(
-            "has {} parts that are strips, fans, lines or points, which are left out",
-            walk.left_out
-        ));
+        warnings.push(format!("has {} parts that are lines or points, which are left out", walk.left_out));
+    }
+    if walk.coloured {
+        warnings.push("has colours of vertices, which are not read".to_owned());
     }
     Ok(Parts { meshes: walk.meshes, materials })
 }
+
+/// Refuses what is not read, by its name, before a parser stumbles over what comes of it.
+fn refuse_unread(path: &Path, bytes: &[u8]) -> Result<(), MapError> {
+    let unread = |what: &str| MapError::unsupported(path, what);
+    let u32_at = |at: usize| Some(u32::from_le_bytes(*bytes.get(at..)?.first_chunk()?));
+    let json = if bytes.starts_with(b"glTF") {
+        if u32_at(4) == Some(1) {
+            return Err(unread("is glTF 1.0, which is not read: export glTF 2.0"));
+        }
+        // Header of twelve bytes; the first chunk, its length and its kind before it, is the JSON.
+        let length = u32_at(12).map_or(0, |length| length as usize);
+        bytes.get(20..20_usize.saturating_add(length)).unwrap_or_default()
+    } else {
+        bytes
+    };
+    let Ok(json) = serde_json::from_slice::<serde_json::Value>(json) else { return Ok(()) };
+    let version = json.pointer("/asset/version").and_then(serde_json::Value::as_str).unwrap_or_default();
+    if version.starts_with("1.") {
+        return Err(unread("is glTF 1.0, which is not read: export glTF 2.0"));
+    }
+    let required = json.get("extensionsRequired").and_then(serde_json::Value::as_array);
+    for name in required.into_iter().flatten().filter_map(serde_json::Value::as_str) {
+        if !READ_EXTENSIONS.contains(&name) {
+            return Err(unread(&format!("requires {name}, which is not read: export it without")));
+        }
+    }
+    Ok(())
+}
+
+/// Extensions that a file may require.
+const READ_EXTENSIONS: [&str; 2] = ["KHR_texture_transform", "KHR_lights_punctual"];
 
 /// Files of the document.
 struct Files<'a> {
@@ -177,7 +210,13 @@ impl Files<'_> {
     /// A texture's values, decoded.
     fn values(&self, texture: &gltf::Texture<'_>, transfer: Transfer) -> Result<Grid<[f32; 4]>, MapError> {
         let (file, image) = self.image(texture)?;
-        Ok(attribute_of_image(&file, &image, transfer)?.values)
+        let values = attribute_of_image(&file, &image, transfer)?.values;
+        // A grey picture is that grey in every colour (glTF 2.0, 3.8.2: as images are decoded to RGB).
+        if image.channels == 1 {
+            let grey = |x: usize, y: usize| values.row(y)[x][0];
+            return Ok(Grid::from_fn(values.size(), |x, y| [grey(x, y), grey(x, y), grey(x, y), 1.0]));
+        }
+        Ok(values)
     }
 
     fn material(
@@ -208,19 +247,39 @@ impl Files<'_> {
                 }
             }
             None => {
-                flat(base.as_ref().or(metal_rough.as_ref()).map_or(Size { width: 1, height: 1 }, Grid::size))
+                let colours = base.as_ref().or(metal_rough.as_ref());
+                let size = colours.map_or(Size { width: 1, height: 1 }, Grid::size);
+                let normals = Grid::from_fn(size, |_, _| Vec3::Z);
+                Arc::new(NormalGrid { normals, wraps: Laying::of(material).wraps })
             }
         };
-        let same_coordinates = |set: u32| normal.as_ref().is_none_or(|n| n.tex_coord() == set);
-        let sets = pbr
-            .base_color_texture()
-            .map(|t| t.tex_coord())
-            .into_iter()
-            .chain(pbr.metallic_roughness_texture().map(|t| t.tex_coord()));
-        if !sets.into_iter().all(same_coordinates) {
+        // A placeholder, however small, is as flat at the size of the colours.
+        let colours = base.as_ref().or(metal_rough.as_ref()).map(Grid::size);
+        let surface = match colours {
+            Some(size) if size.area() > surface.size().area() => match only_normal(&*surface) {
+                Some(normal) => {
+                    let normals = Grid::from_fn(size, |_, _| normal);
+                    Arc::new(NormalGrid { normals, wraps: surface.wraps() }) as Arc<dyn Surface>
+                }
+                None => {
+                    warnings.push(format!("colours of `{name}` are averaged over its smaller normal map"));
+                    surface
+                }
+            },
+            _ => surface,
+        };
+        let own = Laying::of(material);
+        let others = [pbr.base_color_texture(), pbr.metallic_roughness_texture()];
+        if others.iter().flatten().any(|info| Laying::of_info(info) != own) {
             warnings.push(format!(
-                "textures of `{name}` have other coordinates than its normal map, and are laid on by its own"
+                "textures of `{name}` lie otherwise than its normal map (coordinates, transform or edges), and \
+                 are laid on as it is"
             ));
+        }
+        let textures = others.iter().flatten().map(|info| info.texture());
+        if textures.chain(normal.iter().map(|n| n.texture())).any(|texture| is_mirrored(&texture.sampler())) {
+            warnings
+                .push(format!("textures of `{name}` are mirrored beyond their edges, and are repeated here"));
         }
         let factors = MaterialFactors {
             base: pbr.base_color_factor(),
@@ -303,8 +362,24 @@ impl MaterialFactors {
     }
 }
 
+/// The normal of a surface that has no other.
+fn only_normal(surface: &dyn Surface) -> Option<Vec3> {
+    let size = surface.size();
+    let mut row = SurfaceRow::flat(size.width);
+    surface.read_row(0, &mut row);
+    let normal = row.normal(0);
+    let same = (0..size.height).all(|y| {
+        surface.read_row(y, &mut row);
+        (0..size.width).all(|x| row.normal(x) == normal)
+    });
+    same.then_some(normal)
+}
+
+fn is_mirrored(sampler: &gltf::texture::Sampler<'_>) -> bool {
+    [sampler.wrap_s(), sampler.wrap_t()].contains(&gltf::texture::WrappingMode::MirroredRepeat)
+}
+
 fn wraps(sampler: &gltf::texture::Sampler<'_>) -> Wraps {
-    // Mirrored maps are read as repeated: no normal map is meant to be mirrored.
     let wrap =
         |mode| if mode == gltf::texture::WrappingMode::ClampToEdge { Wrap::Clamp } else { Wrap::Repeat };
     Wraps { x: wrap(sampler.wrap_s()), y: wrap(sampler.wrap_t()) }
@@ -319,8 +394,10 @@ struct Walk<'a> {
     seen: HashSet<usize>,
     /// Vertices and indices so far.
     elements: usize,
-    /// Number of primitives left out, which are not triangles.
+    /// Number of primitives left out, which are lines or points.
     left_out: usize,
+    /// Some primitive has colours of its vertices.
+    coloured: bool,
 }
 
 impl Walk<'_> {
@@ -336,7 +413,9 @@ impl Walk<'_> {
         }
         let pose = above * Mat4::from_cols_array_2d(&node.transform().matrix());
         for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
-            if primitive.mode() == gltf::mesh::Mode::Triangles {
+            use gltf::mesh::Mode;
+            self.coloured |= primitive.get(&gltf::Semantic::Colors(0)).is_some();
+            if matches!(primitive.mode(), Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
                 let mesh = self.primitive(&primitive, pose)?;
                 self.meshes.push((mesh, primitive.material().index().unwrap_or(self.plain)));
             } else {
@@ -375,21 +454,17 @@ impl Walk<'_> {
             .ok_or_else(|| MapError::invalid(path, "has a mesh without positions, or outside its buffer"))?
             .map(|p| pose.transform_point3(p.into()))
             .collect();
-        let mut indices: Vec<u32> = match reader.read_indices() {
+        let indices: Vec<u32> = match reader.read_indices() {
             Some(indices) => indices.into_u32().collect(),
             None => (0..positions.len() as u32).collect(),
         };
+        let mut triangles = triangles(&indices, primitive.mode());
         if mirrored {
-            indices.as_chunks_mut::<3>().0.iter_mut().for_each(|t| t.swap(1, 2));
+            triangles.iter_mut().for_each(|t| t.swap(1, 2));
         }
-        let normal_texture = primitive.material().normal_texture();
-        let material = primitive.material();
-        let base = material.pbr_metallic_roughness().base_color_texture();
-        let set = match &normal_texture {
-            Some(normal) => normal.tex_coord(),
-            None => base.map_or(0, |base| base.tex_coord()),
-        };
-        let place = |uv: [f32; 2]| match normal_texture.as_ref().and_then(normal_transform) {
+        let laying = Laying::of(&primitive.material());
+        let set = laying.set;
+        let place = |uv: [f32; 2]| match laying.transform {
             Some((offset, rotation, scale)) => {
                 // KHR_texture_transform: scale, then rotate counter-clockwise as seen with v down, then move.
                 let (sin, cos) = rotation.sin_cos();
@@ -418,19 +493,73 @@ impl Walk<'_> {
                     t.map(turned).collect()
                 })
                 .unwrap_or_default(),
-            triangles: indices.as_chunks().0.to_vec(),
+            triangles,
         })
     }
 }
 
-/// Offset, rotation and scale of `KHR_texture_transform` on a normal texture, which the crate keeps as plain
-/// JSON.
-fn normal_transform(normal: &gltf::material::NormalTexture<'_>) -> Option<(Vec2, f32, Vec2)> {
-    let value = normal.extension_value("KHR_texture_transform")?;
-    let pair = |key: &str, or: f32| {
-        let part = |i: usize| value.get(key).and_then(|v| v.get(i)).and_then(serde_json::Value::as_f64);
-        Vec2::new(part(0).map_or(or, |v| v as f32), part(1).map_or(or, |v| v as f32))
-    };
-    let rotation = value.get("rotation").and_then(serde_json::Value::as_f64).unwrap_or(0.0) as f32;
-    Some((pair("offset", 0.0), rotation, pair("scale", 1.0)))
+/// Triangles of a list, strip or fan of vertices, all of them turned alike (glTF 2.0, 3.7.2.1).
+fn triangles(indices: &[u32], mode: gltf::mesh::Mode) -> Vec<[u32; 3]> {
+    match mode {
+        gltf::mesh::Mode::TriangleStrip => {
+            let turned = |(i, t): (usize, &[u32])| match i % 2 {
+                0 => [t[0], t[1], t[2]],
+                _ => [t[0], t[2], t[1]],
+            };
+            // Strips are joined by triangles without area.
+            let whole = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
+            indices.windows(3).enumerate().map(turned).filter(whole).collect()
+        }
+        gltf::mesh::Mode::TriangleFan => {
+            indices.iter().skip(1).zip(indices.iter().skip(2)).map(|(a, b)| [*a, *b, indices[0]]).collect()
+        }
+        _ => indices.as_chunks().0.to_vec(),
+    }
+}
+
+/// How a texture lies on a mesh: its set of coordinates, its `KHR_texture_transform` (offset, rotation,
+/// scale), and its continuation beyond the edges.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Laying {
+    set: u32,
+    transform: Option<(Vec2, f32, Vec2)>,
+    wraps: Wraps,
+}
+
+impl Laying {
+    /// Laying of a material's map: of its normals, else of its colours, else of its roughness.
+    fn of(material: &gltf::Material<'_>) -> Self {
+        let pbr = material.pbr_metallic_roughness();
+        let others = || pbr.base_color_texture().or_else(|| pbr.metallic_roughness_texture());
+        let plain = Self { set: 0, transform: None, wraps: Wraps::default() };
+        let normal = material.normal_texture().map(|normal| Self::of_normal(&normal));
+        normal.or_else(|| others().map(|info| Self::of_info(&info))).unwrap_or(plain)
+    }
+
+    fn of_info(info: &gltf::texture::Info<'_>) -> Self {
+        let wraps = wraps(&info.texture().sampler());
+        let Some(own) = info.texture_transform() else {
+            return Self { set: info.tex_coord(), transform: None, wraps };
+        };
+        let transform = Some((own.offset().into(), own.rotation(), own.scale().into()));
+        Self { set: own.tex_coord().unwrap_or(info.tex_coord()), transform, wraps }
+    }
+
+    /// Laying of a normal texture, whose extension the crate keeps as plain JSON.
+    fn of_normal(normal: &gltf::material::NormalTexture<'_>) -> Self {
+        let wraps = wraps(&normal.texture().sampler());
+        let plain = Self { set: normal.tex_coord(), transform: None, wraps };
+        let Some(value) = normal.extension_value("KHR_texture_transform") else { return plain };
+        let number = |value: Option<&serde_json::Value>, or: f32| {
+            value.and_then(serde_json::Value::as_f64).map_or(or, |v| v as f32)
+        };
+        let pair = |key: &str, or: f32| {
+            let part = |i: usize| number(value.get(key).and_then(|v| v.get(i)), or);
+            Vec2::new(part(0), part(1))
+        };
+        let set = value.get("texCoord").and_then(serde_json::Value::as_u64);
+        let set = set.and_then(|set| u32::try_from(set).ok()).unwrap_or(plain.set);
+        let rotation = number(value.get("rotation"), 0.0);
+        Self { set, transform: Some((pair("offset", 0.0), rotation, pair("scale", 1.0))), wraps }
+    }
 }
