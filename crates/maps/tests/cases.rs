@@ -169,15 +169,23 @@ fn a_picture_that_ends_before_its_marker_is_still_refused() {
     }
 }
 
-#[test]
-fn layers_to_choose_from_are_listed() {
+/// OpenEXR file of two by two texels with these channels.
+fn exr_of(names: &[String]) -> Vec<u8> {
     use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image, Layer, WritableImage};
-    let channel = |name: &str| AnyChannel::new(name, FlatSamples::F32(vec![0.5; 4]));
-    let names = ["A.Combined.R", "A.Combined.G", "A.Combined.B", "A.Normal.X", "A.Normal.Y", "A.Normal.Z"];
-    let channels = AnyChannels::sort(names.iter().map(|name| channel(name)).collect());
+    let channel = |name: &String| AnyChannel::new(name.as_str(), FlatSamples::F32(vec![0.5; 4]));
+    let channels = AnyChannels::sort(names.iter().map(channel).collect());
     let layer = Layer::new((2, 2), Default::default(), exr::prelude::Encoding::UNCOMPRESSED, channels);
     let mut bytes = std::io::Cursor::new(Vec::new());
     Image::from_layer(layer).write().to_buffered(&mut bytes).unwrap();
-    let error = read_image(Path::new("a.exr"), bytes.get_ref()).err().unwrap().to_string();
-    assert!(error.contains("several layers") && error.contains("A.Normal.Z"), "{error}");
+    bytes.into_inner()
+}
+
+#[test]
+fn layers_to_choose_from_are_listed() {
+    let names = ["Combined.R", "Combined.G", "Combined.B", "Normal.X", "Normal.Y", "Normal.Z"];
+    let error = read_image(Path::new("a.exr"), &exr_of(&names.map(str::to_owned))).err().unwrap().to_string();
+    assert!(error.contains("several layers") && error.contains("Normal.Z"), "{error}");
+    let many: Vec<String> = (0..2000).map(|i| format!("layer{i}.X")).collect();
+    let error = read_image(Path::new("a.exr"), &exr_of(&many)).err().unwrap().to_string();
+    assert!(error.contains("2000 channels"), "{error}");
 }

@@ -132,6 +132,11 @@ fn read_image(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
     }
     let window = image.attributes.display_window;
     let frame = check_size(path, window.size.width(), window.size.height())?;
+    if frame.area() > LARGE_FRAME && frame.area() / 16 > size.area() {
+        let (w, h) = (frame.width, frame.height);
+        let reason = format!("holds less than a sixteenth of the {w} × {h} texels of its display window");
+        return Err(MapError::unsupported(path, reason));
+    }
     let (own, display) = (part.attributes.layer_position, window.position);
     let place = [own.x().saturating_sub(display.x()), own.y().saturating_sub(display.y())];
     let mut picture = Image::new(path, size, channels, Samples::F32(samples))?;
@@ -153,6 +158,13 @@ struct Choice<'a> {
     warning: Option<String>,
 }
 
+/// Most channels that a picture is looked for in.
+const MOST_CHANNELS: usize = 1024;
+
+/// Largest frame that a crop of any size may lie in, in texels; larger ones are at most sixteen times the
+/// crop.
+const LARGE_FRAME: usize = 1 << 24;
+
 /// Names of a picture's channels, in the order in which they are looked for: colours, then vectors.
 const COLOURS_AND_VECTORS: [&[&str]; 4] =
     [&["R", "G", "B"], &["X", "Y", "Z"], &["NX", "NY", "NZ"], &["RED", "GREEN", "BLUE"]];
@@ -163,6 +175,11 @@ const COLOURS_AND_VECTORS: [&[&str]; 4] =
 /// # Errors
 /// [`MapError`] that lists the channels, where there are several layers to choose from.
 fn choose_channels<'a>(path: &Path, parts: &[&'a [AnyChannel<FlatSamples>]]) -> Result<Choice<'a>, MapError> {
+    let count: usize = parts.iter().map(|channels| channels.len()).sum();
+    if count > MOST_CHANNELS {
+        let reason = format!("has {count} channels; at most {MOST_CHANNELS} are read");
+        return Err(MapError::unsupported(path, reason));
+    }
     let mut layers: Vec<(usize, String)> = Vec::new();
     for (part, channels) in parts.iter().enumerate() {
         for channel in channels.iter() {

@@ -126,7 +126,7 @@ fn read_samples(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
             ));
         }
     };
-    if bits < 8 && channels > 1 {
+    if bits == 0 || bits < 8 && channels > 1 {
         return Err(MapError::unsupported(
             path,
             format!("has {channels} channels of {bits} bits; 8 are read"),
