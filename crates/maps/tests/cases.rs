@@ -9,7 +9,9 @@ use glam::Vec3;
 use ndfmap_core::surface::{Surface, SurfaceRow};
 use ndfmap_maps::SourceKind;
 use ndfmap_maps::formats::read_image;
-use ndfmap_maps::source::{SourceMap, SourceOptions, read_source};
+use ndfmap_maps::source::{SourceMap, SourceOptions, read_source, source_of_image};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 
 fn case(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name)
@@ -188,4 +190,30 @@ fn layers_to_choose_from_are_listed() {
     let many: Vec<String> = (0..2000).map(|i| format!("layer{i}.X")).collect();
     let error = read_image(Path::new("a.exr"), &exr_of(&many)).err().unwrap().to_string();
     assert!(error.contains("2000 channels"), "{error}");
+}
+
+#[test]
+fn damaged_cases_are_errors_or_pictures() {
+    let mut random = Pcg64Mcg::seed_from_u64(11);
+    let mut paths: Vec<PathBuf> =
+        std::fs::read_dir(case("")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    for path in paths {
+        let whole = std::fs::read(&path).unwrap();
+        for _ in 0..300 {
+            let mut bytes = whole.clone();
+            if random.random_range(0..4) == 0 {
+                bytes.truncate(random.random_range(0..bytes.len()));
+            }
+            for _ in 0..random.random_range(0..4) {
+                if let Some(last) = bytes.len().checked_sub(1) {
+                    bytes[random.random_range(0..=last)] = random.random();
+                }
+            }
+            // Neither panics; what comes out is an error or a map.
+            if let Ok(image) = read_image(&path, &bytes) {
+                let _ = source_of_image(&path, image, String::new(), &SourceOptions::default());
+            }
+        }
+    }
 }
