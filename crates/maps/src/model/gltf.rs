@@ -517,7 +517,7 @@ fn triangles(indices: &[u32], mode: gltf::mesh::Mode) -> Vec<[u32; 3]> {
     }
 }
 
-/// How a texture lies on a mesh: its set of coordinates, its `KHR_texture_transform` (offset, rotation,
+/// Laying of a texture on a mesh: its set of coordinates, its `KHR_texture_transform` (offset, rotation,
 /// scale), and its continuation beyond the edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Laying {
