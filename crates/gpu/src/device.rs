@@ -72,7 +72,7 @@ impl Device {
         Self { device, queue, name, backend: info.backend, software, rewrite, failure: Arc::default() }
     }
 
-    /// The same device with every shader of ours rewritten: tests make it less exact than it is.
+    /// Device with every shader of ours rewritten: tests make it less exact than it is.
     #[doc(hidden)]
     #[must_use]
     pub fn rewriting_shaders(self, rewrite: fn(&str) -> String) -> Self {

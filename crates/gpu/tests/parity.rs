@@ -62,7 +62,7 @@ struct Probe {
 }
 
 impl Probe {
-    /// The same with its vectors and channels moved by 1.2e-7 of themselves, up or down.
+    /// Probe with its vectors and channels moved by 1.2e-7 of themselves, up or down.
     fn jolted(&self, random: &mut Pcg64Mcg) -> Self {
         let mut factor = || if random.random() { 1.0 + f32::EPSILON } else { 1.0 - f32::EPSILON };
         let mut moved = |v: Vec3| v * Vec3::from_array(std::array::from_fn(|_| factor()));

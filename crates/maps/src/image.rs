@@ -34,18 +34,22 @@ impl Samples {
         }
     }
 
-    /// The same samples of planes one after another, channels interleaved.
-    #[cfg(feature = "tiff")]
-    pub(crate) fn interleaved(self, channels: usize) -> Self {
-        fn weave<T: Copy>(planes: &[T], channels: usize) -> Vec<T> {
-            let area = planes.len() / channels;
-            (0..area * channels).map(|i| planes[i % channels * area + i / channels]).collect()
-        }
+    /// Samples at these places, in this order.
+    #[must_use]
+    pub(crate) fn gathered(&self, places: impl Iterator<Item = usize>) -> Self {
         match self {
-            Self::U8(v) => Self::U8(weave(&v, channels)),
-            Self::U16(v) => Self::U16(weave(&v, channels)),
-            Self::F32(v) => Self::F32(weave(&v, channels)),
+            Self::U8(v) => Self::U8(places.map(|i| v[i]).collect()),
+            Self::U16(v) => Self::U16(places.map(|i| v[i]).collect()),
+            Self::F32(v) => Self::F32(places.map(|i| v[i]).collect()),
         }
+    }
+
+    /// Samples of planes one after another, channels interleaved.
+    #[cfg(feature = "tiff")]
+    #[must_use]
+    pub(crate) fn interleaved(&self, channels: usize) -> Self {
+        let area = self.len() / channels;
+        self.gathered((0..area * channels).map(|i| i % channels * area + i / channels))
     }
 
     /// Number of samples.
@@ -126,50 +130,19 @@ impl Image {
             let (column, row) = if orientation.transposed { (y, x) } else { (x, y) };
             row * stored.width + column
         };
-        let samples = match &self.samples {
-            Samples::U8(v) => Samples::U8(gather(v, channels, size, texel)),
-            Samples::U16(v) => Samples::U16(gather(v, channels, size, texel)),
-            Samples::F32(v) => Samples::F32(gather(v, channels, size, texel)),
-        };
-        Self { size, samples, ..self }
+        let places = (0..size.area()).flat_map(|i| {
+            let first = texel(i) * channels;
+            first..first + channels
+        });
+        Self { size, samples: self.samples.gathered(places), ..self }
     }
 
-    /// The picture in a larger or smaller frame, its first texel at a place of that; the rest is 0.
+    /// The picture of these channels alone, in this order.
     #[must_use]
-    pub(crate) fn within(self, frame: Size, place: [i32; 2]) -> Self {
-        let Samples::F32(values) = &self.samples else { return self };
-        let (size, channels) = (self.size, self.channels);
-        let inside = |at: usize, place: i32, length: usize| {
-            usize::try_from(at as i64 - i64::from(place)).ok().filter(|at| *at < length)
-        };
-        let mut framed = vec![0.0; frame.area() * channels];
-        for (i, texel) in framed.chunks_exact_mut(channels).enumerate() {
-            let x = inside(i % frame.width, place[0], size.width);
-            let y = inside(i / frame.width, place[1], size.height);
-            if let (Some(x), Some(y)) = (x, y) {
-                texel.copy_from_slice(&values[(y * size.width + x) * channels..][..channels]);
-            }
-        }
-        Self { size: frame, samples: Samples::F32(framed), ..self }
+    pub(crate) fn channels(self, chosen: &[usize]) -> Self {
+        let places = (0..self.size.area()).flat_map(|i| chosen.iter().map(move |c| i * self.channels + c));
+        Self { channels: chosen.len(), samples: self.samples.gathered(places), ..self }
     }
-
-    /// The first channels alone.
-    #[must_use]
-    pub(crate) fn first_channels(self, count: usize) -> Self {
-        let keep = |i: &usize| i % self.channels < count;
-        let kept = (0..self.samples.len()).filter(keep);
-        let samples = match &self.samples {
-            Samples::U8(v) => Samples::U8(kept.map(|i| v[i]).collect()),
-            Samples::U16(v) => Samples::U16(kept.map(|i| v[i]).collect()),
-            Samples::F32(v) => Samples::F32(kept.map(|i| v[i]).collect()),
-        };
-        Self { channels: count, samples, ..self }
-    }
-}
-
-/// Samples of texels in another order: texel `i` of the result is `texel(i)` of the values.
-fn gather<T: Copy>(values: &[T], channels: usize, size: Size, texel: impl Fn(usize) -> usize) -> Vec<T> {
-    (0..size.area()).flat_map(|i| values[texel(i) * channels..][..channels].iter().copied()).collect()
 }
 
 /// Checks the sides that a header claims.

@@ -221,24 +221,14 @@ fn height_field(
     Ok(HeightField { heights, wraps: options.wraps, filter: options.slope_filter })
 }
 
-/// Alpha and green as x and y, where red is full everywhere and alpha is not the same everywhere: no normals
-/// of a surface all point along x, but DXT5nm has its x in alpha.
-fn unswizzled(image: &Image) -> Option<Image> {
+/// True where red is full everywhere and alpha is not the same everywhere: no normals of a surface all point
+/// along x, but DXT5nm has its x in alpha and its y in green.
+fn is_swizzled(image: &Image) -> bool {
     let sample = |i: usize, c: usize| image.samples.get(i * image.channels + c);
     let mut texels = 0..image.size.area();
-    if image.channels != 4
-        || !texels.clone().all(|i| sample(i, 0) == 1.0)
-        || texels.all(|i| sample(i, 3) == sample(0, 3))
-    {
-        return None;
-    }
-    let order = (0..image.size.area()).flat_map(|i| [4 * i + 3, 4 * i + 1]);
-    let samples = match &image.samples {
-        Samples::U8(v) => Samples::U8(order.map(|i| v[i]).collect()),
-        Samples::U16(v) => Samples::U16(order.map(|i| v[i]).collect()),
-        Samples::F32(v) => Samples::F32(order.map(|i| v[i]).collect()),
-    };
-    Some(Image { size: image.size, channels: 2, samples, warnings: image.warnings.clone() })
+    image.channels == 4
+        && texels.clone().all(|i| sample(i, 0) == 1.0)
+        && texels.any(|i| sample(i, 3) != sample(0, 3))
 }
 
 /// Texels that tell what a picture holds: more would tell no more.
@@ -248,7 +238,7 @@ const WITNESSES: usize = 1 << 16;
 /// and those that are not finite do not count.
 fn unit_share(image: &Image, positive: bool) -> f64 {
     let (mut unit, mut all) = (0_usize, 0_usize);
-    // An odd step goes over all columns.
+    // An odd step goes over all columns of a map whose width is a power of two.
     for i in (0..image.size.area()).step_by((image.size.area() / WITNESSES) | 1) {
         let stored = Vec3::from_array([0, 1, 2].map(|c| image.samples.get(i * image.channels + c)));
         if stored == Vec3::ZERO || !stored.is_finite() {
@@ -301,12 +291,11 @@ impl EncodedNormals {
                 "has one channel: no normal map. `--from height` takes it as heights",
             ));
         }
-        let image = match unswizzled(&image) {
-            Some(xy) => {
-                warnings.push("is full in red: x is taken from alpha and y from green (DXT5nm)".to_owned());
-                xy
-            }
-            None => image,
+        let image = if is_swizzled(&image) {
+            warnings.push("is full in red: x is taken from alpha and y from green (DXT5nm)".to_owned());
+            image.channels(&[3, 1])
+        } else {
+            image
         };
         let texels = || 0..image.size.area();
         let sample = |i: usize, c: usize| image.samples.get(i * image.channels + c);

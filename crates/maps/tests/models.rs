@@ -324,7 +324,7 @@ fn what_is_laid_on_otherwise_or_left_out_is_said() {
         let extension = serde_json::json!({ "KHR_texture_transform": { "offset": [0.5, 0] } });
         json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = extension;
     };
-    warned(other, "lie otherwise than its normal map");
+    warned(other, "do not lie alike");
     let mirrored = |json: &mut serde_json::Value| {
         json["samplers"] = serde_json::json!([{ "wrapS": 33648, "wrapT": 10497 }]);
         json["textures"][0]["sampler"] = 0.into();

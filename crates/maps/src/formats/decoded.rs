@@ -33,7 +33,7 @@ pub(super) fn read_integers(
     };
     let (size, buffer) = decode(path, decoder, capacity)?;
     let image = Image::new(path, size, channels, Samples::U8(buffer))?;
-    Ok(if channels == 2 { image.first_channels(1) } else { image })
+    Ok(if channels == 2 { image.channels(&[0]) } else { image })
 }
 
 /// All bytes of a picture, its size checked first: against the bounds, and against what the file can hold.

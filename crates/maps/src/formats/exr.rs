@@ -123,13 +123,7 @@ fn read_image(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
     if choice.channels.iter().any(|c| c.sampling != Vec2(1, 1)) {
         return Err(MapError::unsupported(path, "has subsampled channels; full resolution is read"));
     }
-    let channels = choice.channels.len();
-    let mut samples = vec![0.0; size.area() * channels];
-    for (at, channel) in choice.channels.iter().enumerate() {
-        for (i, value) in channel.sample_data.values_as_f32().enumerate() {
-            samples[i * channels + at] = value;
-        }
-    }
+    // A crop of its display window, whose other texels are 0.
     let window = image.attributes.display_window;
     let frame = check_size(path, window.size.width(), window.size.height())?;
     if frame.area() > LARGE_FRAME && frame.area() / 16 > size.area() {
@@ -138,10 +132,23 @@ fn read_image(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
         return Err(MapError::unsupported(path, reason));
     }
     let (own, display) = (part.attributes.layer_position, window.position);
-    let place = [own.x().saturating_sub(display.x()), own.y().saturating_sub(display.y())];
-    let mut picture = Image::new(path, size, channels, Samples::F32(samples))?;
+    let place = [i64::from(own.x()) - i64::from(display.x()), i64::from(own.y()) - i64::from(display.y())];
+    let inside = |at: usize, place: i64, length: usize| {
+        usize::try_from(at as i64 + place).ok().filter(|at| *at < length)
+    };
+    let channels = choice.channels.len();
+    let mut samples = vec![0.0; frame.area() * channels];
+    for (at, channel) in choice.channels.iter().enumerate() {
+        for (i, value) in channel.sample_data.values_as_f32().enumerate() {
+            let x = inside(i % size.width, place[0], frame.width);
+            let y = inside(i / size.width, place[1], frame.height);
+            if let (Some(x), Some(y)) = (x, y) {
+                samples[(y * frame.width + x) * channels + at] = value;
+            }
+        }
+    }
+    let mut picture = Image::new(path, frame, channels, Samples::F32(samples))?;
     if (frame, place) != (size, [0, 0]) {
-        picture = picture.within(frame, place);
         let (w, h) = (size.width, size.height);
         let reason = format!("holds {w} × {h} of {} × {} texels; the rest is 0", frame.width, frame.height);
         picture.warnings.push(reason);

@@ -81,5 +81,5 @@ fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
     };
     // Grey with alpha is a grey picture: alpha means nothing to a height map.
     let image = Image::new(path, size, channels, samples)?;
-    Ok(if channels == 2 { image.first_channels(1) } else { image })
+    Ok(if channels == 2 { image.channels(&[0]) } else { image })
 }

@@ -169,7 +169,7 @@ fn read_samples(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
     let samples = if planar { samples.interleaved(channels) } else { samples };
     let mut image = Image::new(path, size, channels, samples)?.oriented(orientation);
     if alpha {
-        image = image.first_channels(1);
+        image = image.channels(&[0]);
     }
     if let Some(hole) = no_data {
         let filled = match &mut image.samples {

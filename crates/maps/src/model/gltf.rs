@@ -272,8 +272,8 @@ impl Files<'_> {
         let others = [pbr.base_color_texture(), pbr.metallic_roughness_texture()];
         if others.iter().flatten().any(|info| Laying::of_info(info) != own) {
             warnings.push(format!(
-                "textures of `{name}` lie otherwise than its normal map (coordinates, transform or edges), and \
-                 are laid on as it is"
+                "textures of `{name}` do not lie alike (coordinates, transform or edges): all are laid on as its \
+                 normal map, or without one as its colours"
             ));
         }
         let textures = others.iter().flatten().map(|info| info.texture());
@@ -463,16 +463,6 @@ impl Walk<'_> {
             triangles.iter_mut().for_each(|t| t.swap(1, 2));
         }
         let laying = Laying::of(&primitive.material());
-        let set = laying.set;
-        let place = |uv: [f32; 2]| match laying.transform {
-            Some((offset, rotation, scale)) => {
-                // KHR_texture_transform: scale, then rotate counter-clockwise as seen with v down, then move.
-                let (sin, cos) = rotation.sin_cos();
-                let uv = Vec2::from(uv) * scale;
-                Vec2::new(cos * uv.x + sin * uv.y, cos * uv.y - sin * uv.x) + offset
-            }
-            None => uv.into(),
-        };
         let sign = if mirrored { -1.0 } else { 1.0 };
         let normals: Vec<Vec3> = reader
             .read_normals()
@@ -483,7 +473,10 @@ impl Walk<'_> {
         Ok(RawMesh {
             positions,
             normals,
-            uvs: reader.read_tex_coords(set).map(|uv| uv.into_f32().map(place).collect()).unwrap_or_default(),
+            uvs: reader
+                .read_tex_coords(laying.set)
+                .map(|uv| uv.into_f32().map(|uv| laying.transform.apply(uv.into())).collect())
+                .unwrap_or_default(),
             tangents: tangents
                 .map(|t| {
                     let turned = |t: [f32; 4]| {
@@ -517,12 +510,32 @@ fn triangles(indices: &[u32], mode: gltf::mesh::Mode) -> Vec<[u32; 3]> {
     }
 }
 
-/// Laying of a texture on a mesh: its set of coordinates, its `KHR_texture_transform` (offset, rotation,
-/// scale), and its continuation beyond the edges.
+/// Transform of a texture's coordinates, `KHR_texture_transform`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct TextureTransform {
+    offset: Vec2,
+    /// Radians, counter-clockwise as seen with v down.
+    rotation: f32,
+    scale: Vec2,
+}
+
+impl TextureTransform {
+    const IDENTITY: Self = Self { offset: Vec2::ZERO, rotation: 0.0, scale: Vec2::ONE };
+
+    /// Coordinates scaled, then rotated, then moved.
+    fn apply(&self, uv: Vec2) -> Vec2 {
+        let (sin, cos) = self.rotation.sin_cos();
+        let uv = uv * self.scale;
+        Vec2::new(cos * uv.x + sin * uv.y, cos * uv.y - sin * uv.x) + self.offset
+    }
+}
+
+/// Laying of a texture on a mesh: its set of coordinates, their transform, and its continuation beyond the
+/// edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Laying {
     set: u32,
-    transform: Option<(Vec2, f32, Vec2)>,
+    transform: TextureTransform,
     wraps: Wraps,
 }
 
@@ -531,25 +544,27 @@ impl Laying {
     fn of(material: &gltf::Material<'_>) -> Self {
         let pbr = material.pbr_metallic_roughness();
         let others = || pbr.base_color_texture().or_else(|| pbr.metallic_roughness_texture());
-        let plain = Self { set: 0, transform: None, wraps: Wraps::default() };
+        let plain = Self { set: 0, transform: TextureTransform::IDENTITY, wraps: Wraps::default() };
         let normal = material.normal_texture().map(|normal| Self::of_normal(&normal));
         normal.or_else(|| others().map(|info| Self::of_info(&info))).unwrap_or(plain)
     }
 
     fn of_info(info: &gltf::texture::Info<'_>) -> Self {
-        let wraps = wraps(&info.texture().sampler());
+        let (set, wraps) = (info.tex_coord(), wraps(&info.texture().sampler()));
         let Some(own) = info.texture_transform() else {
-            return Self { set: info.tex_coord(), transform: None, wraps };
+            return Self { set, transform: TextureTransform::IDENTITY, wraps };
         };
-        let transform = Some((own.offset().into(), own.rotation(), own.scale().into()));
-        Self { set: own.tex_coord().unwrap_or(info.tex_coord()), transform, wraps }
+        let (offset, rotation, scale) = (own.offset().into(), own.rotation(), own.scale().into());
+        let transform = TextureTransform { offset, rotation, scale };
+        Self { set: own.tex_coord().unwrap_or(set), transform, wraps }
     }
 
     /// Laying of a normal texture, whose extension the crate keeps as plain JSON.
     fn of_normal(normal: &gltf::material::NormalTexture<'_>) -> Self {
-        let wraps = wraps(&normal.texture().sampler());
-        let plain = Self { set: normal.tex_coord(), transform: None, wraps };
-        let Some(value) = normal.extension_value("KHR_texture_transform") else { return plain };
+        let (set, wraps) = (normal.tex_coord(), wraps(&normal.texture().sampler()));
+        let Some(value) = normal.extension_value("KHR_texture_transform") else {
+            return Self { set, transform: TextureTransform::IDENTITY, wraps };
+        };
         let number = |value: Option<&serde_json::Value>, or: f32| {
             value.and_then(serde_json::Value::as_f64).map_or(or, |v| v as f32)
         };
@@ -557,9 +572,11 @@ impl Laying {
             let part = |i: usize| number(value.get(key).and_then(|v| v.get(i)), or);
             Vec2::new(part(0), part(1))
         };
-        let set = value.get("texCoord").and_then(serde_json::Value::as_u64);
-        let set = set.and_then(|set| u32::try_from(set).ok()).unwrap_or(plain.set);
-        let rotation = number(value.get("rotation"), 0.0);
-        Self { set, transform: Some((pair("offset", 0.0), rotation, pair("scale", 1.0))), wraps }
+        let own = value.get("texCoord").and_then(serde_json::Value::as_u64);
+        let own = own.and_then(|own| u32::try_from(own).ok());
+        let (offset, rotation, scale) =
+            (pair("offset", 0.0), number(value.get("rotation"), 0.0), pair("scale", 1.0));
+        let transform = TextureTransform { offset, rotation, scale };
+        Self { set: own.unwrap_or(set), transform, wraps }
     }
 }
