@@ -35,8 +35,8 @@ const DEVICES: u64 = 3;
 const JOLTS: usize = 3;
 
 /// Changes on the inexact devices that a sound device may be off by. Tosses of coins add up to the root of
-/// the number of errors, and the worst device to their number. Of 8.8 million outputs of four more
-/// inexact devices, 240 were off by more, though their every operation errs by all it may.
+/// the number of errors, and the worst device to their number. Of 1 752 000
+/// outputs of four more inexact devices 16 are off by more (`further_inexact_devices_keep_the_bounds`).
 const SPREADS: f64 = 4.0;
 
 /// Bound, as a share of a number, from which on it says nothing: the number is fragile.
@@ -237,47 +237,62 @@ const NAMES: [&str; OUTPUTS] = [
 /// Number of outputs.
 const OUTPUTS: usize = 12;
 
+/// Comparison of a question's answers on both devices.
+struct Comparison {
+    name: String,
+    shader: String,
+    exact: Vec<[f32; OUTPUTS]>,
+    answers: Vec<[f64; OUTPUTS]>,
+    /// Largest change of each output on the inexact devices.
+    spreads: Vec<[f64; OUTPUTS]>,
+}
+
+impl Comparison {
+    fn new(device: &Device, question: &Question<'_>, probes: &[Probe]) -> Self {
+        let Question { method, brdf } = question;
+        let name = format!("{method} with {} and {}", brdf.lobe, brdf.shading.name());
+        let shader = shader::link(*method, &*brdf.lobe, 0) + include_str!("parity.wgsl");
+        let exact = question.outputs(device, &shader, probes);
+        let mut spreads = vec![[0.0_f64; OUTPUTS]; probes.len()];
+        for number in 0..DEVICES {
+            let inexact = question.jolted(device, &shader, probes, number);
+            for (i, output) in inexact.iter().enumerate() {
+                let i = i % probes.len();
+                for k in 0..OUTPUTS {
+                    let change = f64::from((output[k] - exact[i][k]).abs());
+                    assert!(change.is_finite(), "{name}, probe {i}, {}: no number to differ from", NAMES[k]);
+                    spreads[i][k] = spreads[i][k].max(change);
+                }
+            }
+        }
+        let answers = probes.iter().map(|probe| question.answer(probe)).collect();
+        Self { name, shader, exact, answers, spreads }
+    }
+
+    /// Error that output k of a probe may have by [`RELATIVE`] alone, and in all.
+    fn allowed(&self, i: usize, k: usize) -> [f64; 2] {
+        let plain = RELATIVE * self.answers[i][k].abs() + 1e-30;
+        [plain, plain + SPREADS * self.spreads[i][k]]
+    }
+}
+
 /// Compares, and prints the share of outputs within [`RELATIVE`] alone and how much of its bound the worst
 /// takes.
 fn compare(device: &Device, question: &Question<'_>, probes: &[Probe]) {
-    let name =
-        format!("{} with {} and {}", question.method, question.brdf.lobe, question.brdf.shading.name());
-    let text = shader::link(question.method, &*question.brdf.lobe, 0) + include_str!("parity.wgsl");
-    let exact = question.outputs(device, &text, probes);
-    let inexact: Vec<_> = (0..DEVICES).map(|number| question.jolted(device, &text, probes, number)).collect();
+    let comparison = Comparison::new(device, question, probes);
+    let Comparison { name, exact, answers, spreads, .. } = &comparison;
     let (mut within, mut fragile, mut worst) = (0, 0, 0.0_f64);
-    for (i, (probe, got)) in probes.iter().zip(&exact).enumerate() {
-        let answer = question.answer(probe);
+    for (i, probe) in probes.iter().enumerate() {
         for k in 0..OUTPUTS {
-            assert!(
-                got[k].is_finite(),
-                "{name}, probe {i}, {}: {} for {}\n{probe:?}",
-                NAMES[k],
-                got[k],
-                answer[k]
-            );
-            let error = (f64::from(got[k]) - answer[k]).abs();
-            let plain = RELATIVE * answer[k].abs() + 1e-30;
+            let (got, answer) = (exact[i][k], answers[i][k]);
+            let (error, [plain, allowed]) = ((f64::from(got) - answer).abs(), comparison.allowed(i, k));
             within += usize::from(error <= plain);
-            let sets = inexact.iter().flat_map(|all| all.iter().skip(i).step_by(probes.len()));
-            let changes = sets.map(|other| f64::from((other[k] - got[k]).abs()));
-            let spread = changes.fold(0.0, |most: f64, change| {
-                assert!(
-                    change.is_finite(),
-                    "{name}, probe {i}, {}: no number on an inexact device",
-                    NAMES[k]
-                );
-                most.max(change)
-            });
-            fragile += usize::from(SPREADS * spread > FRAGILE * answer[k].abs().max(1e-6));
-            let allowed = plain + SPREADS * spread;
+            fragile += usize::from(SPREADS * spreads[i][k] > FRAGILE * answer.abs().max(1e-6));
             worst = worst.max(error / allowed);
             assert!(
                 error <= allowed,
-                "{name}, probe {i}, {}: {} for {}, off by {error:e}, allowed {allowed:e}\n{probe:?}",
+                "{name}, probe {i}, {}: {got} for {answer}, off by {error:e}, allowed {allowed:e}\n{probe:?}",
                 NAMES[k],
-                got[k],
-                answer[k],
             );
         }
     }
@@ -384,4 +399,35 @@ fn inexact_devices_err_by_what_the_standard_allows() {
         inexact.iter().flat_map(|o| (0..1000).map(move |i| share(o, i))).fold(0.0, f32::max)
     });
     assert!(shares.iter().all(|share| (0.9..1.3).contains(share)), "{shares:?}");
+}
+
+#[test]
+#[ignore = "a count for the docs: four more devices for every lobe and for displaced surfaces"]
+fn further_inexact_devices_keep_the_bounds() {
+    let Some(device) = device() else { return };
+    let (mut beyond, mut all) = (0, 0);
+    let mut count = |method: &str, lobe: &str, shading: ShadingModel| {
+        let method = method.parse::<AnyMethod>().unwrap();
+        let probes = probes(&*method, 500);
+        let brdf = brdf(lobe, shading);
+        let question = Question { method: &*method, brdf: &brdf };
+        let comparison = Comparison::new(&device, &question, &probes);
+        for number in DEVICES..DEVICES + 4 {
+            let outputs = question.outputs(&device, &inexact(&comparison.shader, number), &probes);
+            for (i, output) in outputs.iter().enumerate() {
+                let off = |k: usize| (f64::from(output[k]) - comparison.answers[i][k]).abs();
+                beyond += (0..OUTPUTS).filter(|k| off(*k) > comparison.allowed(i, *k)[1]).count();
+                all += OUTPUTS;
+            }
+        }
+    };
+    for lobe in brdf::TABLE.iter().flat_map(|row| row.samples) {
+        ShadingModel::ALL.into_iter().for_each(|shading| count("vmf:4", lobe, shading));
+    }
+    for lobe in ["beckmann:0.05", "beckmann:0.4", "ggx:0.2", "lambert"] {
+        ["slopes", "slopes:9"].into_iter().for_each(|method| count(method, lobe, ShadingModel::Shadowed));
+    }
+    eprintln!("{beyond} of {all} numbers are beyond their bound");
+    // Their every operation errs by all it may, which no device does.
+    assert!(f64::from(beyond as u32) < 1e-4 * f64::from(all as u32));
 }
