@@ -9,7 +9,7 @@ use ndfmap_maps::model::{ModelOptions, model_of_bytes};
 
 fuzz_target!(|bytes: &[u8]| {
     let Some((first, bytes)) = bytes.split_first() else { return };
-    let name = ["map.obj", "map.ply", "map.gltf", "map.glb"][usize::from(first & 3)];
+    let name = ["map.obj", "map.fbx", "map.ply", "map.gltf", "map.glb"][usize::from(first % 5)];
     let options = ModelOptions { staging: SceneOptions::default() };
     if let Ok((scene, _)) = model_of_bytes(Path::new(name), bytes, &options) {
         for object in &scene.objects {

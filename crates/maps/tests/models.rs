@@ -27,6 +27,32 @@ const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\npr
     property float s\nproperty float t\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
     -1 -1 0 0 0\n1 -1 0 1 0\n1 1 0 1 1\n-1 1 0 0 1\n4 0 1 2 3\n";
 
+/// The same square as FBX.
+const FBX: &str = r#"; FBX 7.4.0 project file
+FBXHeaderExtension: { FBXHeaderVersion: 1003
+ FBXVersion: 7400 }
+GlobalSettings: { Version: 1000 }
+Objects: {
+ Geometry: 10, "Geometry::square", "Mesh" {
+  Vertices: *12 { a: -1,-1,0,1,-1,0,1,1,0,-1,1,0 }
+  PolygonVertexIndex: *4 { a: 0,1,2,-4 }
+  GeometryVersion: 124
+  LayerElementUV: 0 { Version: 101
+   Name: "map"
+   MappingInformationType: "ByPolygonVertex"
+   ReferenceInformationType: "Direct"
+   UV: *8 { a: 0,0,1,0,1,1,0,1 } }
+  Layer: 0 { Version: 100
+   LayerElement: { Type: "LayerElementUV"
+    TypedIndex: 0 } } }
+ Model: 20, "Model::square", "Mesh" { Version: 232 }
+}
+Connections: {
+ C: "OO",20,0
+ C: "OO",10,20
+}
+"#;
+
 /// The same square as glTF: positions, coordinates (v down), indices, a two by one normal map and a base
 /// colour.
 fn gltf() -> Vec<u8> {
@@ -80,7 +106,13 @@ fn gltf() -> Vec<u8> {
 
 #[test]
 fn one_square_comes_out_of_every_format() {
-    for (name, bytes) in [("a.obj", OBJ.as_bytes()), ("a.ply", PLY.as_bytes()), ("a.gltf", &gltf())] {
+    let files = [
+        ("a.obj", OBJ.as_bytes()),
+        ("a.fbx", FBX.as_bytes()),
+        ("a.ply", PLY.as_bytes()),
+        ("a.gltf", &gltf()),
+    ];
+    for (name, bytes) in files {
         let (scene, warnings) = read(name, bytes).unwrap();
         assert_eq!(warnings, [] as [&str; 0], "{name}");
         let mesh = &scene.objects[0].mesh;
@@ -163,7 +195,12 @@ fn errors_name_the_file_and_what_is_wrong() {
 #[test]
 fn damaged_models_are_errors_or_models() {
     let mut random = Pcg64Mcg::seed_from_u64(1);
-    let sound = [("a.obj", OBJ.as_bytes().to_vec()), ("a.ply", PLY.as_bytes().to_vec()), ("a.gltf", gltf())];
+    let sound = [
+        ("a.obj", OBJ.as_bytes().to_vec()),
+        ("a.fbx", FBX.as_bytes().to_vec()),
+        ("a.ply", PLY.as_bytes().to_vec()),
+        ("a.gltf", gltf()),
+    ];
     assert!(TABLE.len() == sound.len());
     let mut refused = 0;
     for (name, bytes) in &sound {
@@ -259,7 +296,7 @@ fn what_is_not_read_is_refused_by_its_name() {
     let binary = [b"glTF".as_slice(), &1_u32.to_le_bytes(), &[0; 12]].concat();
     for (bytes, reason) in [
         (required("KHR_draco_mesh_compression"), "requires KHR_draco_mesh_compression"),
-        (required("EXT_texture_webp"), "requires EXT_texture_webp"),
+        (required("KHR_materials_pbrSpecularGlossiness"), "requires KHR_materials_pbrSpecularGlossiness"),
         (version, "glTF 1.0"),
         (binary, "glTF 1.0"),
     ] {
@@ -325,14 +362,73 @@ fn what_is_laid_on_otherwise_or_left_out_is_said() {
         json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = extension;
     };
     warned(other, "do not lie alike");
-    let mirrored = |json: &mut serde_json::Value| {
-        json["samplers"] = serde_json::json!([{ "wrapS": 33648, "wrapT": 10497 }]);
-        json["textures"][0]["sampler"] = 0.into();
-        json["textures"][1]["sampler"] = 0.into();
-    };
-    warned(mirrored, "are mirrored");
     let coloured = |json: &mut serde_json::Value| {
         json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 0.into();
     };
-    warned(coloured, "colours of vertices");
+    warned(coloured, "colours that vary");
+}
+
+/// A PNG of two texels.
+fn two_texels(pixels: &[u8; 6]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 2, 1);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.write_header().unwrap().write_image_data(pixels).unwrap();
+    bytes
+}
+
+#[test]
+fn materials_of_an_obj_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
+    let read = |mtl: &str| {
+        write("a.mtl", mtl.as_bytes());
+        write("a.obj", format!("mtllib a.mtl\nusemtl first\n{OBJ}").as_bytes());
+        read_model(&folder.path().join("a.obj"), &options()).unwrap()
+    };
+    // Numbers: base colour, roughness, metalness.
+    let (scene, warnings) = read("newmtl first\nKd 0.5 0.25 0\nPr 0.6\nPm 0.25\n");
+    assert_eq!(warnings, [] as [&str; 0]);
+    let material = &scene.materials[scene.objects[0].material];
+    assert_eq!(material.name, "first");
+    assert!((material.params.diffuse - 0.75 * DVec3::new(0.5, 0.25, 0.0)).length() < 1e-6);
+    assert!((material.params.specular.x - (0.03 + 0.125)).abs() < 1e-6, "{}", material.params.specular);
+    // Textures, as Blender writes them: a normal map in the place of the bumps, in a folder of its own.
+    std::fs::create_dir(folder.path().join("textures")).unwrap();
+    write("textures/n.png", &two_texels(&[128, 128, 255, 218, 128, 218]));
+    write("c.png", &two_texels(&[255, 0, 0, 0, 0, 255]));
+    let (scene, warnings) = read(
+        "newmtl first\nKd 0.1 0.1 0.1\nPm 0\nmap_Kd C:\\work\\c.png\nmap_Bump -bm 1.0 n.png\nmap_Pr gone.png\n",
+    );
+    assert_eq!(warnings, ["names the texture `gone.png`, which is not there: it is left out"]);
+    let material = &scene.materials[scene.objects[0].material];
+    let diffuse = &material.textures.as_ref().unwrap().diffuse_roughness;
+    assert_eq!(diffuse.row(0)[0][..3], [1.0, 0.0, 0.0]);
+    assert_eq!(diffuse.row(0)[1][..3], [0.0, 0.0, 1.0]);
+    let mut row = ndfmap_core::surface::SurfaceRow::flat(2);
+    material.map.read_row(0, &mut row);
+    // 218 is 0.71: a normal at 45 degrees, to 8 bits.
+    assert!((row.normal(1) - Vec3::new(1.0, 0.0, 1.0).normalize()).length() < 0.01, "{}", row.normal(1));
+    // Without its library, a material is plain.
+    write("a.obj", format!("mtllib gone.mtl\nusemtl first\n{OBJ}").as_bytes());
+    let (_, warnings) = read_model(&folder.path().join("a.obj"), &options()).unwrap();
+    assert_eq!(warnings, ["names the materials of `gone.mtl`, which is not there: they are plain"]);
+}
+
+#[test]
+fn an_fbx_is_turned_upright_and_posed() {
+    // z up in the file, and the square's node moved along it.
+    let settings = "GlobalSettings: { Version: 1000\n Properties70: {\n  P: \"UpAxis\", \"int\", \"Integer\", \"\",2\n\
+        \x20 P: \"UpAxisSign\", \"int\", \"Integer\", \"\",1\n  P: \"FrontAxis\", \"int\", \"Integer\", \"\",1\n\
+        \x20 P: \"FrontAxisSign\", \"int\", \"Integer\", \"\",-1\n  P: \"CoordAxis\", \"int\", \"Integer\", \"\",0\n\
+        \x20 P: \"CoordAxisSign\", \"int\", \"Integer\", \"\",1\n } }";
+    let moved = "\"Mesh\" { Version: 232\n Properties70: {\n  P: \"Lcl Translation\", \"Lcl Translation\", \"\", \"A\",0,0,3\n } }";
+    let file = FBX
+        .replace("GlobalSettings: { Version: 1000 }", settings)
+        .replace("\"Mesh\" { Version: 232 }", moved);
+    let (scene, _) = read("a.fbx", file.as_bytes()).unwrap();
+    for v in &scene.objects[0].mesh.vertices {
+        assert!((v.normal - Vec3::Y).length() < 1e-6, "{}", v.normal);
+        assert!((v.position.y - 3.0).abs() < 1e-6, "{}", v.position);
+    }
 }

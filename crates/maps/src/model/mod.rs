@@ -1,15 +1,20 @@
-//! Models: meshes and materials from glTF, OBJ and PLY files, as scenes.
+//! Models: meshes and materials from glTF, OBJ, FBX and PLY files, as scenes.
 //!
 //! A parser only fills in a raw mesh. This module makes what the file leaves out, the same way for all
 //! formats: normals (area-weighted), map coordinates (`unwrap.rs`), tangents (MikkTSpace), and a camera and
 //! two lights that suit the model's size.
 
+mod corners;
 #[cfg(feature = "gltf")]
 mod gltf;
-#[cfg(feature = "obj")]
-mod obj;
+#[cfg(any(feature = "gltf", feature = "obj"))]
+mod material;
+#[cfg(feature = "gltf")]
+mod mirror;
 #[cfg(feature = "ply")]
 mod ply;
+#[cfg(feature = "obj")]
+mod ufbx;
 mod unwrap;
 
 use std::path::Path;
@@ -44,7 +49,9 @@ pub static TABLE: &[ModelFormat] = &[
     #[cfg(feature = "gltf")]
     gltf::FORMAT,
     #[cfg(feature = "obj")]
-    obj::FORMAT,
+    ufbx::OBJ,
+    #[cfg(feature = "obj")]
+    ufbx::FBX,
     #[cfg(feature = "ply")]
     ply::FORMAT,
 ];
@@ -56,6 +63,7 @@ pub struct ModelOptions {
 }
 
 /// Meshes and their materials.
+#[derive(Default)]
 struct Parts {
     meshes: Vec<(RawMesh, usize)>,
     /// Materials; an empty list stands for one plain material, index 0.
@@ -202,9 +210,20 @@ fn microfacets(alpha: f64) -> Brdf {
     Brdf::new(Ggx::new(alpha), ShadingModel::Smith)
 }
 
+/// Triangles of a strip of vertices, all of them turned alike.
+fn strip(indices: &[u32]) -> Vec<[u32; 3]> {
+    let turned = |(i, t): (usize, &[u32])| match i % 2 {
+        0 => [t[0], t[1], t[2]],
+        _ => [t[0], t[2], t[1]],
+    };
+    // Strips are joined by triangles without area.
+    let whole = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
+    indices.windows(3).enumerate().map(turned).filter(whole).collect()
+}
+
 impl RawMesh {
-    /// Checks the mesh and makes its missing parts.
-    fn finish(mut self, path: &Path, warnings: &mut Vec<String>) -> Result<Mesh, MapError> {
+    /// Refuses triangles of vertices that are not there, and vertices that are no places.
+    fn check(&self, path: &Path) -> Result<(), MapError> {
         let count = self.positions.len();
         if count.max(self.triangles.len()) > MAX_ELEMENTS {
             return Err(MapError::unsupported(
@@ -221,6 +240,13 @@ impl RawMesh {
                 "has vertices that are no places: NaN, infinite or beyond 1e18",
             ));
         }
+        Ok(())
+    }
+
+    /// Checks the mesh and makes its missing parts.
+    fn finish(mut self, path: &Path, warnings: &mut Vec<String>) -> Result<Mesh, MapError> {
+        self.check(path)?;
+        let count = self.positions.len();
         for (length, what) in [
             (self.normals.len(), "normals"),
             (self.uvs.len(), "map coordinates"),

@@ -1,0 +1,324 @@
+//! Wavefront OBJ and FBX by the `ufbx` library: shapes, normals, map coordinates, materials and textures.
+//!
+//! Polygons are cut into triangles by the library, concave ones too. Files of FBX are turned so that y is up.
+//! Textures are looked for beside the model by their relative names, then by their last names, there and in
+//! a folder `textures`: files name the folders of whoever wrote them.
+
+use std::path::{Path, PathBuf};
+
+use glam::{DMat3, DVec3, Vec2};
+use ndfmap_core::grid::Grid;
+use ndfmap_core::lookup::area_mean;
+use ndfmap_core::surface::{Surface, Wrap, Wraps};
+use ndfmap_scene::Material;
+use ufbx::{
+    AllocatorOpts, CoordinateAxes, FileFormat, IndexErrorHandling, LoadOpts, MaterialMap, Matrix, Texture,
+    WrapMode,
+};
+
+use super::corners::CornerMesh;
+use super::material::{Factors, MetalRough, colours};
+use super::{MAX_ELEMENTS, ModelFormat, Parts};
+use crate::attribute::Transfer;
+use crate::formats::{read_file, read_image};
+use crate::source::{SourceOptions, source_of_image};
+use crate::{Image, MapError, SourceKind};
+
+pub(super) const OBJ: ModelFormat = ModelFormat {
+    name: "OBJ",
+    extensions: &["obj"],
+    read: |path, bytes, warnings| read(path, bytes, FileFormat::Obj, warnings),
+};
+
+pub(super) const FBX: ModelFormat = ModelFormat {
+    name: "FBX",
+    extensions: &["fbx"],
+    read: |path, bytes, warnings| read(path, bytes, FileFormat::Fbx, warnings),
+};
+
+/// Memory for each of the library's two heaps: a base, and a multiple of the file's length. A face of an OBJ
+/// of four bytes ("f 1 ") becomes some hundred bytes of lists.
+fn memory(bytes: &[u8]) -> AllocatorOpts {
+    AllocatorOpts { memory_limit: (64 << 20) + 512 * bytes.len(), ..AllocatorOpts::default() }
+}
+
+fn read(
+    path: &Path,
+    bytes: &[u8],
+    file_format: FileFormat,
+    warnings: &mut Vec<String>,
+) -> Result<Parts, MapError> {
+    let is_obj = file_format == FileFormat::Obj;
+    let library = if is_obj { material_library(path, bytes, warnings) } else { Vec::new() };
+    let opts = LoadOpts {
+        temp_allocator: memory(bytes),
+        result_allocator: memory(bytes),
+        ignore_animation: true,
+        index_error_handling: IndexErrorHandling::NoIndex,
+        file_format,
+        target_axes: match is_obj {
+            true => CoordinateAxes::default(),
+            false => CoordinateAxes::right_handed_y_up(),
+        },
+        obj_mtl_data: library.as_slice().into(),
+        ..LoadOpts::default()
+    };
+    let scene = ufbx::load_memory(bytes, opts)
+        .map_err(|e| MapError::invalid(path, format!("is damaged: {}", e.description.to_lowercase())))?;
+    let mut parts = Parts::default();
+    for material in &scene.materials {
+        parts.materials.push(Look { path, material }.read(warnings)?);
+    }
+    let plain = parts.materials.len();
+    parts.materials.push(super::plain());
+    let (mut triangles, mut left_out, mut unmapped) = (0, 0, false);
+    for node in &scene.nodes {
+        let Some(mesh) = &node.mesh else { continue };
+        triangles += mesh.num_triangles;
+        if triangles > MAX_ELEMENTS {
+            return Err(MapError::unsupported(path, format!("has more than {MAX_ELEMENTS} triangles")));
+        }
+        left_out += mesh.num_line_faces + mesh.num_point_faces;
+        let shape = Shape { mesh, pose: &node.geometry_to_world };
+        for part in &mesh.material_parts {
+            let at = part.index as usize;
+            let own = node.materials.get(at).or_else(|| mesh.materials.get(at));
+            let material = own.map_or(plain, |m| m.element.typed_id as usize);
+            let gone = || MapError::invalid(path, "has a face of a vertex that is not there");
+            let corners = shape.part(part).ok_or_else(gone)?;
+            unmapped |=
+                mesh.vertex_uv.exists && corners.uvs.as_chunks::<3>().0.contains(&[NO_COORDINATES; 3]);
+            parts.meshes.push((corners.weld(), material));
+        }
+    }
+    if left_out > 0 {
+        warnings.push(format!("has {left_out} lines and points, which are left out"));
+    }
+    if unmapped {
+        warnings.push("has faces without map coordinates, which take one texel of the map".to_owned());
+    }
+    if !scene.skin_deformers.is_empty() {
+        warnings.push("has a skeleton: only the pose of the file is shown".to_owned());
+    }
+    if !scene.nurbs_surfaces.is_empty() {
+        warnings.push("has NURBS surfaces, which are left out".to_owned());
+    }
+    Ok(parts)
+}
+
+/// Coordinates that the library gives to corners without any, v turned down.
+const NO_COORDINATES: Vec2 = Vec2::new(0.0, 1.0);
+
+/// Bytes of the material library that an OBJ names; none where it names none, or it cannot be read.
+fn material_library(path: &Path, bytes: &[u8], warnings: &mut Vec<String>) -> Vec<u8> {
+    let named = bytes.split(|b| *b == b'\n').find_map(|line| line.trim_ascii().strip_prefix(b"mtllib "));
+    let Some(name) = named.map(|name| String::from_utf8_lossy(name.trim_ascii()).into_owned()) else {
+        return Vec::new();
+    };
+    let read = beside(path, &name).map(|file| read_file(&file));
+    if let Some(Ok(library)) = read {
+        return library;
+    }
+    warnings.push(format!("names the materials of `{name}`, which is not there: they are plain"));
+    Vec::new()
+}
+
+/// File that a model names: beside it by the relative name, else by the last name, there or in `textures`.
+fn beside(path: &Path, name: &str) -> Option<PathBuf> {
+    let name = name.replace('\\', "/");
+    let folder = path.with_file_name("");
+    let last = Path::new(&name).file_name()?;
+    let relative = Some(folder.join(&name)).filter(|_| !Path::new(&name).has_root());
+    let others = [folder.join(last), folder.join("textures").join(last)];
+    relative.into_iter().chain(others).find(|file| file.is_file())
+}
+
+/// Shape of a node: its mesh, and its pose.
+struct Shape<'a> {
+    mesh: &'a ufbx::Mesh,
+    pose: &'a Matrix,
+}
+
+impl Shape<'_> {
+    /// Triangles of one material; `None` where a face has a vertex that is not there.
+    fn part(&self, part: &ufbx::MeshPart) -> Option<CornerMesh> {
+        let mesh = self.mesh;
+        let m = self.pose;
+        let column = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+        let linear = DMat3::from_cols(
+            column(m.m00, m.m10, m.m20),
+            column(m.m01, m.m11, m.m21),
+            column(m.m02, m.m12, m.m22),
+        );
+        let moved = column(m.m03, m.m13, m.m23);
+        let turned = linear.inverse().transpose();
+        let vector = |v: &ufbx::Vec3| DVec3::new(v.x, v.y, v.z);
+        let position = |v: &ufbx::Vec3| (linear * vector(v) + moved).as_vec3();
+        let mut out =
+            CornerMesh { positions: mesh.vertices.iter().map(position).collect(), ..CornerMesh::default() };
+        let mut indices = Vec::new();
+        for face in &part.face_indices {
+            let face = mesh.faces[*face as usize];
+            // The library cuts polygons without a look at their indices.
+            let corners = face.index_begin as usize..(face.index_begin + face.num_indices) as usize;
+            if mesh.vertex_indices.as_ref()[corners].iter().any(|i| *i as usize >= out.positions.len()) {
+                return None;
+            }
+            ufbx::triangulate_face_vec(&mut indices, mesh, face);
+            for triangle in indices.as_chunks::<3>().0 {
+                let mut corners = *triangle;
+                if linear.determinant() < 0.0 {
+                    corners.swap(1, 2);
+                }
+                let corners = corners.map(|c| c as usize);
+                out.triangles.push(corners.map(|c| mesh.vertex_indices[c]));
+                if mesh.vertex_normal.exists {
+                    let normal = |c: usize| (turned * vector(&mesh.vertex_normal[c])).as_vec3();
+                    out.normals.extend(corners.map(normal));
+                }
+                if mesh.vertex_uv.exists {
+                    // Both formats have v up the picture.
+                    let uv = |c: usize| {
+                        let uv = mesh.vertex_uv.values.get(mesh.vertex_uv.indices[c] as usize);
+                        uv.map_or(NO_COORDINATES, |uv| Vec2::new(uv.x as f32, 1.0 - uv.y as f32))
+                    };
+                    out.uvs.extend(corners.map(uv));
+                }
+            }
+        }
+        if !mesh.vertex_normal.exists {
+            out.smooth();
+        }
+        Some(out)
+    }
+}
+
+/// Material of a file, and the model that it is beside.
+struct Look<'a> {
+    path: &'a Path,
+    material: &'a ufbx::Material,
+}
+
+impl Look<'_> {
+    /// What the library makes of it in metalness and roughness; a plain one where the file says nothing.
+    fn read(&self, warnings: &mut Vec<String>) -> Result<Material, MapError> {
+        let (pbr, fbx) = (&self.material.pbr, &self.material.fbx);
+        let name = self.material.element.name.to_string();
+        let named = [&pbr.base_color, &pbr.roughness, &pbr.metalness, &pbr.normal_map, &fbx.bump];
+        if !pbr.base_color.has_value && named.iter().all(|map| texture(map).is_none()) {
+            return Ok(Material { name, ..super::plain() });
+        }
+        let number = |map: &MaterialMap, or: f64| if map.has_value { map.value_vec4.x } else { or };
+        let colour = pbr.base_color.value_vec4;
+        let factor = number(&pbr.base_factor, 1.0);
+        let glossy = self.material.features.roughness_as_glossiness.enabled;
+        let roughness = match number(&pbr.roughness, 0.5) {
+            glossiness if glossy => 1.0 - glossiness,
+            roughness => roughness,
+        };
+        let metal_rough = self.metal_rough(glossy, warnings)?;
+        let base = self.values(&pbr.base_color, Transfer::Srgb, warnings)?;
+        // A texture stands in the place of the number (the library's documentation of `MaterialMap`).
+        let unless = |textured: bool, value: f64| if textured { 1.0 } else { value as f32 };
+        let rough_textured = texture(&pbr.roughness).is_some() && metal_rough.is_some();
+        let metal_textured = texture(&pbr.metalness).is_some() && metal_rough.is_some();
+        let made = MetalRough {
+            name,
+            factors: Factors {
+                base: [colour.x, colour.y, colour.z].map(|c| unless(base.is_some(), c * factor)),
+                metallic: unless(metal_textured, number(&pbr.metalness, 0.0)),
+                roughness: unless(rough_textured, roughness),
+            },
+            normals: self.normals(warnings)?,
+            base,
+            metal_rough,
+            wraps: texture(&pbr.base_color).map(wraps).unwrap_or_default(),
+        };
+        Ok(made.into_material(warnings))
+    }
+
+    /// Picture of a texture, and a path to name it by; `None` with a warning where it is not there.
+    fn image(
+        &self,
+        texture: &Texture,
+        warnings: &mut Vec<String>,
+    ) -> Result<Option<(PathBuf, Image)>, MapError> {
+        let name = match texture.relative_filename.is_empty() {
+            true => texture.filename.to_string(),
+            false => texture.relative_filename.to_string(),
+        };
+        if texture.has_uv_transform {
+            warnings.push(format!("has a transform of the texture `{name}`, which is not read"));
+        }
+        if !texture.content.is_empty() {
+            let path = self.path.join(Path::new(&name).file_name().unwrap_or_default());
+            return read_image(&path, &texture.content).map(|image| Some((path, image)));
+        }
+        let Some(file) = beside(self.path, &name) else {
+            warnings.push(format!("names the texture `{name}`, which is not there: it is left out"));
+            return Ok(None);
+        };
+        let image = read_image(&file, &read_file(&file)?)?;
+        Ok(Some((file, image)))
+    }
+
+    fn values(
+        &self,
+        map: &MaterialMap,
+        transfer: Transfer,
+        warnings: &mut Vec<String>,
+    ) -> Result<Option<Grid<[f32; 4]>>, MapError> {
+        let Some(texture) = texture(map) else { return Ok(None) };
+        let Some((file, image)) = self.image(texture, warnings)? else { return Ok(None) };
+        colours(&file, &image, transfer).map(Some)
+    }
+
+    /// Roughness and metalness in the channels of glTF, at the larger of their two sizes.
+    fn metal_rough(
+        &self,
+        glossy: bool,
+        warnings: &mut Vec<String>,
+    ) -> Result<Option<Grid<[f32; 4]>>, MapError> {
+        let pbr = &self.material.pbr;
+        let rough = self.values(&pbr.roughness, Transfer::Linear, warnings)?;
+        let metal = self.values(&pbr.metalness, Transfer::Linear, warnings)?;
+        let sizes = [&rough, &metal].into_iter().flatten().map(Grid::size);
+        let Some(size) = sizes.max_by_key(|size| size.area()) else { return Ok(None) };
+        let first = |map: &Option<Grid<[f32; 4]>>, x: usize, y: usize| {
+            map.as_ref().map(|map| area_mean(map, size, x, y)[0])
+        };
+        Ok(Some(Grid::from_fn(size, |x, y| {
+            let rough = first(&rough, x, y).map_or(1.0, |r| if glossy { 1.0 - r } else { r });
+            [1.0, rough, first(&metal, x, y).unwrap_or(1.0), 1.0]
+        })))
+    }
+
+    /// Normals of the normal map, or of a bump map that holds normals, as exporters of OBJ write them.
+    fn normals(&self, warnings: &mut Vec<String>) -> Result<Option<std::sync::Arc<dyn Surface>>, MapError> {
+        let (pbr, fbx) = (&self.material.pbr, &self.material.fbx);
+        let named = [&pbr.normal_map, &fbx.normal_map, &fbx.bump];
+        let Some(texture) = named.into_iter().find_map(texture) else { return Ok(None) };
+        let Some((file, image)) = self.image(texture, warnings)? else { return Ok(None) };
+        let options = SourceOptions { wraps: wraps(texture), ..SourceOptions::default() };
+        let map = source_of_image(&file, image, String::new(), &options)?;
+        let name = &*self.material.element.name;
+        if map.source.kind == SourceKind::Height {
+            warnings.push(format!(
+                "heights of `{name}` are left out, as their scale is not in the file: `--map` lays them on"
+            ));
+            return Ok(None);
+        }
+        warnings.extend(map.warnings.iter().map(|w| format!("normal map of `{name}` {w}")));
+        Ok(Some(map.surface))
+    }
+}
+
+/// Texture of a slot that is in use.
+fn texture(map: &MaterialMap) -> Option<&Texture> {
+    map.texture.as_deref().filter(|_| map.texture_enabled)
+}
+
+fn wraps(texture: &Texture) -> Wraps {
+    let wrap = |mode| if mode == WrapMode::Clamp { Wrap::Clamp } else { Wrap::Repeat };
+    Wraps { x: wrap(texture.wrap_u), y: wrap(texture.wrap_v) }
+}
