@@ -1,4 +1,8 @@
 //! Environments: pictures of light from everywhere, by latitude and longitude or on the faces of a cube.
+//!
+//! Faces of cubes are seen from inside, as OpenGL and Direct3D define them: in a world whose z runs ahead while
+//! x runs to the right, the mirror image of ours. Ours has the same z, and x the other way. OpenEXR defines its
+//! cubes in a world like ours (ImfEnvmap.h, "Cube map"), whose panoramas look to +z where ours look to -z.
 
 use std::path::Path;
 
@@ -6,6 +10,7 @@ use glam::{DVec2, DVec3, Vec3};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::environment::{Environment, builtin, cube_direction};
 
+use crate::formats::exr::is_cube;
 use crate::formats::{read_file, read_image};
 use crate::source::BUILTIN_PREFIX;
 use crate::{Image, MapError, Samples};
@@ -18,6 +23,11 @@ struct Layout {
     faces: [(usize, usize); 6],
     last_turned: bool,
 }
+
+/// Strip of an OpenEXR file that says so. Turned by half from its world to ours, it is OpenGL's strip but for
+/// the order of the last two faces.
+const OPENEXR: Layout =
+    Layout { sides: (1, 6), faces: [(0, 0), (0, 1), (0, 2), (0, 3), (0, 5), (0, 4)], last_turned: false };
 
 /// Pictures of a cube: crosses, and strips.
 const LAYOUTS: [Layout; 4] = [
@@ -58,7 +68,8 @@ pub fn parse_environment(path: &Path, bytes: &[u8]) -> Result<(Environment, Vec<
         picture
     } else {
         let fits = |l: &&Layout| width * l.sides.1 == height * l.sides.0 && width.is_multiple_of(l.sides.0);
-        let layout = LAYOUTS.iter().find(fits).ok_or_else(|| {
+        let own = Some(&OPENEXR).filter(|_| is_cube(path, bytes));
+        let layout = own.into_iter().chain(&LAYOUTS).find(fits).ok_or_else(|| {
             MapError::unsupported(
                 path,
                 format!(
@@ -121,7 +132,7 @@ fn unfold(picture: &Grid<Vec3>, layout: &Layout) -> Grid<Vec3> {
     let blank = Environment::new(Grid::from_fn(size, |_, _| Vec3::ZERO))
         .unwrap_or_else(|_| unreachable!("black is radiance"));
     let look = |w: DVec3| {
-        let (face, at) = face_of(w);
+        let (face, at) = face_of(DVec3::new(-w.x, w.y, w.z));
         let at = if layout.last_turned && face == 5 { -at } else { at };
         let texel = |t: f64| (((t + 1.0) / 2.0 * side as f64) as usize).min(side - 1);
         let (column, row) = layout.faces[face];
@@ -137,7 +148,7 @@ fn unfold(picture: &Grid<Vec3>, layout: &Layout) -> Grid<Vec3> {
     })
 }
 
-/// Face that a direction goes through, and the place on it.
+/// Face that a direction in OpenGL's world goes through, and the place on it.
 fn face_of(w: DVec3) -> (usize, DVec2) {
     let hit = |face: usize| {
         let axis = cube_direction(face, 0.0, 0.0);
@@ -155,22 +166,74 @@ fn face_of(w: DVec3) -> (usize, DVec2) {
 mod tests {
     use super::*;
 
+    /// A sky without any symmetry.
+    fn sky(w: DVec3) -> Vec3 {
+        (Vec3::splat(2.0) + (w + 0.5 * DVec3::new(w.y * w.z, w.z * w.x, w.x)).as_vec3()).max(Vec3::ZERO)
+    }
+
+    /// Largest difference from the sky, over places inside each face.
+    fn largest_error(picture: &Grid<Vec3>, layout: &Layout) -> f32 {
+        let e = Environment::new(unfold(picture, layout)).unwrap();
+        let ways = (0..6).flat_map(|face| [(0.3, -0.4), (-0.7, 0.1), (0.2, 0.8)].map(|at| (face, at)));
+        let error = |(face, (s, t)): (usize, (f64, f64))| {
+            let w = cube_direction(face, s, t).normalize();
+            (e.radiance(w).as_vec3() - sky(w)).abs().max_element()
+        };
+        ways.map(error).fold(0.0, f32::max)
+    }
+
+    /// Texels of 1/32 of a face, in a sky whose slope is at most 2.5.
+    const TOLERANCE: f32 = 2.5 * 2.0 / 32.0;
+
     #[test]
-    fn cubes_unfold_in_every_layout() {
-        // Each face has its own colour: straight ahead, along +x, must be the colour of face +x.
-        let colour = |face: usize| Vec3::new(face as f32 + 1.0, 0.5, 0.0);
+    fn crosses_and_strips_are_seen_from_inside() {
+        // Ahead, right and up of each face in a world whose z runs ahead and x to the right, as seen on a cross.
+        let axes = [
+            [DVec3::X, DVec3::NEG_Z, DVec3::Y],
+            [DVec3::NEG_X, DVec3::Z, DVec3::Y],
+            [DVec3::Y, DVec3::X, DVec3::NEG_Z],
+            [DVec3::NEG_Y, DVec3::X, DVec3::Z],
+            [DVec3::Z, DVec3::X, DVec3::Y],
+            [DVec3::NEG_Z, DVec3::NEG_X, DVec3::Y],
+        ];
+        let side = 32;
         for layout in &LAYOUTS {
-            let side = 8;
             let size = Size { width: layout.sides.0 * side, height: layout.sides.1 * side };
             let picture = Grid::from_fn(size, |x, y| {
                 let at = (x / side, y / side);
-                layout.faces.iter().position(|f| *f == at).map_or(Vec3::ZERO, colour)
+                let Some(face) = layout.faces.iter().position(|f| *f == at) else { return Vec3::ZERO };
+                let place = |i: usize| ((i % side) as f64 + 0.5) / side as f64 * 2.0 - 1.0;
+                let turn = if layout.last_turned && face == 5 { -1.0 } else { 1.0 };
+                let [ahead, right, up] = axes[face];
+                let w = ahead + turn * (place(x) * right - place(y) * up);
+                // Ours is the mirror image of that world.
+                sky(DVec3::new(-w.x, w.y, w.z).normalize())
             });
-            let e = Environment::new(unfold(&picture, layout)).unwrap();
-            for face in 0..6 {
-                let w = cube_direction(face, 0.3, -0.4).normalize();
-                assert_eq!(e.radiance(w), colour(face).as_dvec3(), "{face}");
-            }
+            let error = largest_error(&picture, layout);
+            assert!(error < TOLERANCE, "{:?}: {error}", layout.sides);
         }
+    }
+
+    #[test]
+    fn cubes_of_openexr_agree_with_its_panoramas() {
+        // ImfEnvmap: faces +x, -x, +y, -y, +z, -z from the top; right and down of each.
+        let faces = [
+            [DVec3::X, DVec3::Z, DVec3::NEG_Y],
+            [DVec3::NEG_X, DVec3::NEG_Z, DVec3::NEG_Y],
+            [DVec3::Y, DVec3::X, DVec3::NEG_Z],
+            [DVec3::NEG_Y, DVec3::X, DVec3::Z],
+            [DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y],
+            [DVec3::NEG_Z, DVec3::X, DVec3::NEG_Y],
+        ];
+        let side = 32;
+        let picture = Grid::from_fn(Size { width: side, height: 6 * side }, |x, y| {
+            let place = |i: usize| ((i % side) as f64 + 0.5) / side as f64 * 2.0 - 1.0;
+            let [ahead, right, down] = faces[y / side];
+            let w = ahead + place(x) * right + place(y) * down;
+            // Its panoramas have +z in the middle, where ours have -z: half a turn.
+            sky(DVec3::new(-w.x, w.y, -w.z).normalize())
+        });
+        let error = largest_error(&picture, &OPENEXR);
+        assert!(error < TOLERANCE, "{error}");
     }
 }

@@ -36,13 +36,24 @@ fn exr_and_hdr_are_read() {
 #[test]
 fn cubes_are_read() {
     let folder = tempfile::tempdir().unwrap();
-    // A strip of six faces, each its number.
+    // A strip of six faces in the order of OpenGL, whose x runs against ours; each its number.
     let path = exr(folder.path(), "strip.exr", (24, 4), |x, _| Vec3::splat((x / 4) as f32 + 1.0));
     let (sky, _) = read_environment(&path).unwrap();
-    let faces = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
+    let faces = [DVec3::NEG_X, DVec3::X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
     for (face, w) in faces.into_iter().enumerate() {
         let aside = (w + DVec3::new(0.1, 0.12, 0.14)).normalize();
         assert_eq!(sky.radiance(aside).x, face as f64 + 1.0, "{w}");
+    }
+    // One place twice: red on the right of blue, green above. The cross looks to +z, the panorama to -z.
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
+    for (name, turn) in [("b01_env_lat.exr", 1.0), ("b01_env_cross.exr", -1.0)] {
+        let (sky, _) = read_environment(&cases.join(name)).unwrap();
+        for (w, channel) in [(DVec3::X, 0), (DVec3::NEG_Z, 2), (DVec3::Y, 1)] {
+            let w = w * DVec3::new(turn, 1.0, turn);
+            // Half floats hold 8 exactly; other ways have 0.1 or less.
+            assert_eq!(sky.radiance(w)[channel], 8.0, "{name} {w}");
+            assert!(sky.radiance(-w)[channel] < 0.2, "{name} {w}");
+        }
     }
 }
 

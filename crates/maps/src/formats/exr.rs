@@ -9,7 +9,7 @@ use std::io::{Cursor, Write};
 use std::path::Path;
 
 use ::exr::math::RoundingMode;
-use ::exr::meta::attribute::{AttributeValue, Text};
+use ::exr::meta::attribute::{AttributeValue, EnvironmentMap, Text};
 use ::exr::meta::{BlockDescription, MetaData};
 use ::exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image as ExrImage, ImageAttributes,
@@ -103,6 +103,13 @@ fn header_text(meta: &MetaData) -> Option<String> {
 fn has_bumpslopes(meta: &MetaData) -> bool {
     let channels = &meta.headers[0].channels.list;
     BUMPSLOPES.iter().all(|name| channels.iter().any(|c| c.name.eq_case_insensitive(name)))
+}
+
+/// True for a file that says of itself that it is a cube of an environment, by OpenEXR's definition.
+pub(crate) fn is_cube(path: &Path, bytes: &[u8]) -> bool {
+    let says_cube =
+        |meta: MetaData| meta.headers[0].own_attributes.environment_map == Some(EnvironmentMap::Cube);
+    bytes.starts_with(FORMAT.magic[0]) && metadata(path, bytes).is_ok_and(says_cube)
 }
 
 fn read_image(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
