@@ -24,6 +24,17 @@ struct Layout {
     last_turned: bool,
 }
 
+impl Layout {
+    fn fits(&self, size: Size) -> bool {
+        size.width * self.sides.1 == size.height * self.sides.0 && size.width.is_multiple_of(self.sides.0)
+    }
+}
+
+/// True for the size of a panorama, or of a cube in a known layout.
+pub(crate) fn is_environment_size(size: Size) -> bool {
+    size.width == 2 * size.height || LAYOUTS.iter().any(|layout| layout.fits(size))
+}
+
 /// Strip of an OpenEXR file that says so. Turned by half from its world to ours, it is OpenGL's strip but for
 /// the order of the last two faces.
 const OPENEXR: Layout =
@@ -67,7 +78,7 @@ pub fn parse_environment(path: &Path, bytes: &[u8]) -> Result<(Environment, Vec<
     let latitudes = if width == 2 * height {
         picture
     } else {
-        let fits = |l: &&Layout| width * l.sides.1 == height * l.sides.0 && width.is_multiple_of(l.sides.0);
+        let fits = |l: &&Layout| l.fits(Size { width, height });
         let own = Some(&OPENEXR).filter(|_| is_cube(path, bytes));
         let layout = own.into_iter().chain(&LAYOUTS).find(fits).ok_or_else(|| {
             MapError::unsupported(

@@ -4,7 +4,11 @@ use std::path::Path;
 
 use ndfmap_core::ndf::{Decoded, NormalLobe};
 use ndfmap_core::surface::{SurfaceRow, integrability, slope_of_normal};
-use ndfmap_maps::source::SourceMap;
+use ndfmap_maps::formats::{read_file, read_image};
+use ndfmap_maps::source::{
+    BUILTIN_PREFIX, Convention, DEFAULT_HEIGHT_SCALE, NormalLayout, PictureKind, SourceMap, SourceOptions,
+    identify, read_source, source_of_image,
+};
 use ndfmap_maps::{Header, MapError, NdfMap, Source, SourceKind};
 use serde::{Serialize, Serializer};
 
@@ -33,15 +37,35 @@ pub struct LevelSize {
     pub height: usize,
 }
 
-/// Description of a map that is to be baked.
+/// Description of a picture: what it looks like, and its surface where it holds one.
 #[derive(Clone, Debug, Serialize)]
-pub struct SourceReport {
-    /// `normal` or `height`.
-    pub kind: SourceKind,
+pub struct PictureReport {
+    /// Kind that it looks like, or is taken as.
+    pub kind: PictureKind,
     /// Texels in a row.
     pub width: usize,
     /// Rows.
     pub height: usize,
+    /// Samples a texel.
+    pub channels: usize,
+    /// Smallest and largest finite sample; integers run from 0 to 1.
+    pub range: [f32; 2],
+    /// Channels of a normal, for normals.
+    pub layout: Option<NormalLayout>,
+    /// Direction of green, for normals: `opengl` is up, `directx` down; `None` where nothing tells it.
+    pub convention: Option<&'static str>,
+    /// Sentences that tell what it looks like.
+    pub evidence: Vec<String>,
+    /// Surface that it holds, for normals and heights.
+    #[serde(flatten)]
+    pub surface: Option<SurfaceReport>,
+    /// Warnings of its reader.
+    pub warnings: Vec<String>,
+}
+
+/// Description of a surface that is to be baked.
+#[derive(Clone, Debug, Serialize)]
+pub struct SurfaceReport {
     /// Source that it was read from.
     pub source: Source,
     /// Length of the mean normal; 1 for a flat map.
@@ -51,8 +75,6 @@ pub struct SourceReport {
     /// Measure of how well the slopes are the gradient of some height: 1 for a perfect gradient, near 0 when
     /// nothing can be said, negative when y points the other way.
     pub integrability: f64,
-    /// Warnings of its reader.
-    pub warnings: Vec<String>,
 }
 
 /// Texel of a baked map, decoded.
@@ -166,9 +188,82 @@ pub fn describe_map(map: &NdfMap) -> MapReport {
     }
 }
 
-/// Describes a map that is to be baked.
-#[must_use]
-pub fn describe_source(map: &SourceMap) -> SourceReport {
+/// Describes a picture, or a built-in surface.
+///
+/// # Errors
+/// [`Error::Map`] when it cannot be read as the options say.
+pub fn describe_picture(path: &Path, options: &SourceOptions) -> Result<PictureReport, Error> {
+    if path.to_str().is_some_and(|name| name.starts_with(BUILTIN_PREFIX)) {
+        return Ok(describe_builtin(&read_source(path, options)?));
+    }
+    let image = read_image(path, &read_file(path)?)?;
+    let identity = identify(path, &image);
+    let samples = (0..image.samples.len()).map(|i| image.samples.get(i)).filter(|v| v.is_finite());
+    let range = samples.fold([f32::MAX, f32::MIN], |[low, high], v| [low.min(v), high.max(v)]);
+    let mut report = PictureReport {
+        kind: identity.kind,
+        width: image.size.width,
+        height: image.size.height,
+        channels: image.channels,
+        range,
+        layout: identity.layout,
+        convention: None,
+        evidence: identity.evidence,
+        surface: None,
+        warnings: image.warnings.clone(),
+    };
+    let kind = options.kind.or(match identity.kind {
+        PictureKind::Normal => Some(SourceKind::Normal),
+        PictureKind::Height => Some(SourceKind::Height),
+        _ => None,
+    });
+    let Some(kind) = kind else { return Ok(report) };
+    // A description is given where a bake would ask: of the slopes with green up, and at the default scale.
+    let told = SourceOptions {
+        kind: Some(kind),
+        convention: options.convention.or(Some(Convention::OpenGl)).filter(|_| kind == SourceKind::Normal),
+        height_scale: options
+            .height_scale
+            .or(Some(DEFAULT_HEIGHT_SCALE))
+            .filter(|_| kind == SourceKind::Height),
+        ..*options
+    };
+    let mut map = source_of_image(path, image.clone(), String::new(), &told)?;
+    if let Some(evidence) = map.convention {
+        let verdict = options.convention.or(evidence.verdict());
+        if verdict != told.convention && verdict.is_some() {
+            map =
+                source_of_image(path, image, String::new(), &SourceOptions { convention: verdict, ..told })?;
+        }
+        report.convention = verdict.map(Convention::name);
+        report.evidence.push(evidence.to_string());
+        report.kind = PictureKind::Normal;
+    } else {
+        report.kind = PictureKind::Height;
+    }
+    report.warnings = map.warnings.clone();
+    report.surface = Some(describe_surface(&map));
+    Ok(report)
+}
+
+fn describe_builtin(map: &SourceMap) -> PictureReport {
+    let size = map.surface.size();
+    let normal = map.source.kind == SourceKind::Normal;
+    PictureReport {
+        kind: if normal { PictureKind::Normal } else { PictureKind::Height },
+        width: size.width,
+        height: size.height,
+        channels: 3,
+        range: [0.0, 1.0],
+        layout: normal.then_some(NormalLayout::Xyz),
+        convention: normal.then_some(Convention::OpenGl.name()),
+        evidence: vec!["is built in".to_owned()],
+        surface: Some(describe_surface(map)),
+        warnings: map.warnings.clone(),
+    }
+}
+
+fn describe_surface(map: &SourceMap) -> SurfaceReport {
     let size = map.surface.size();
     let (mut mean, mut slopes) = (glam::DVec3::ZERO, [0.0_f64; 4]);
     let mut row = SurfaceRow::flat(size.width);
@@ -184,15 +279,11 @@ pub fn describe_source(map: &SourceMap) -> SourceReport {
     }
     let texels = size.area() as f64;
     let [x, y, xx, yy] = slopes.map(|s| s / texels);
-    SourceReport {
-        kind: map.source.kind,
-        width: size.width,
-        height: size.height,
+    SurfaceReport {
         source: map.source.clone(),
         mean_normal_length: (mean / texels).length(),
         slope_variance: [xx - x * x, yy - y * y],
         integrability: integrability(&*map.surface),
-        warnings: map.warnings.clone(),
     }
 }
 

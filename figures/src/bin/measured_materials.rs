@@ -39,8 +39,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let map = std::env::args().nth(1).map_or_else(|| PathBuf::from("builtin:foil"), PathBuf::from);
     let options = SourceOptions {
         kind: None,
-        convention: Convention::OpenGl,
-        height_scale: DEFAULT_HEIGHT_SCALE,
+        convention: Some(Convention::OpenGl),
+        height_scale: Some(DEFAULT_HEIGHT_SCALE),
         invert: false,
         slope_filter: SlopeFilter::CentralDifference,
         wraps: Wraps::default(),

@@ -1,6 +1,6 @@
 //! Arguments that several commands take, and their parsers.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
@@ -10,26 +10,34 @@ use ndfmap::core::light::environment::{SceneEnvironment, Technique, builtin};
 use ndfmap::core::ndf::{self, AnyMethod, ParseMethodError};
 use ndfmap::core::pyramid;
 use ndfmap::core::surface::{SlopeFilter, Wrap, Wraps};
+use ndfmap::inspect::{PictureReport, describe_picture};
 use ndfmap::maps::SourceKind;
 use ndfmap::maps::environment::read_environment;
 use ndfmap::maps::merl::read_merl;
 use ndfmap::maps::model::is_model;
-use ndfmap::maps::source::{Convention, DEFAULT_HEIGHT_SCALE, SourceOptions};
+use ndfmap::maps::source::{
+    Convention, DEFAULT_HEIGHT_SCALE, SourceMap, SourceOptions, fit_height_scale, read_source,
+};
 use ndfmap::{Error, RotatingEnvironment, scene};
 use serde_json::json;
 
 /// Reading of the source map.
 #[derive(Debug, Args)]
 pub(super) struct SourceArguments {
-    /// Take the map as normals or as heights [default: grey pictures are heights]
-    #[arg(long, value_enum)]
+    /// Take the map as normals or as heights [default: by what it looks like]
+    #[arg(long, value_enum, ignore_case = true)]
     from: Option<From>,
-    /// Direction of green in a normal map: up (opengl) or down (directx)
-    #[arg(long, value_enum, default_value_t = ConventionArgument::Opengl)]
+    /// Direction of green in a normal map: up (opengl), down (directx), or as its slopes and name tell
+    #[arg(long, value_enum, ignore_case = true, default_value_t = ConventionArgument::Auto)]
     convention: ConventionArgument,
-    /// Height of one unit (full white), in texture widths
-    #[arg(long, value_name = "S", default_value_t = DEFAULT_HEIGHT_SCALE, value_parser = positive, allow_negative_numbers = true)]
-    height_scale: f64,
+    /// Height of one unit (full white), in texture widths; `auto` fits it to `--normal-map`
+    #[arg(long, value_name = "S", value_parser = HeightScale::from_str, allow_negative_numbers = true,
+        help = format!("Height of one unit (full white), in texture widths; `auto` fits it to `--normal-map` \
+            [default: {DEFAULT_HEIGHT_SCALE}]"))]
+    height_scale: Option<HeightScale>,
+    /// Normal map of the same surface, whose slopes `--height-scale auto` fits
+    #[arg(long, value_name = "FILE")]
+    normal_map: Option<PathBuf>,
     /// White is deep: the height map is a depth map
     #[arg(long)]
     invert: bool,
@@ -57,8 +65,27 @@ enum From {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum ConventionArgument {
+    Auto,
     Opengl,
     Directx,
+}
+
+/// Scale of heights: a number, or the one that fits a normal map.
+#[derive(Clone, Copy, Debug)]
+enum HeightScale {
+    Fitted,
+    Given(f64),
+}
+
+impl FromStr for HeightScale {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.to_lowercase().as_str() {
+            "auto" => Ok(Self::Fitted),
+            number => positive(number).map(Self::Given),
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -70,18 +97,57 @@ enum FilterArgument {
 }
 
 impl SourceArguments {
-    /// Returns the options in the library's form, for built-in maps of this size.
-    pub(super) fn options(&self, builtin_size: Size) -> SourceOptions {
+    /// Reads the map, at a height scale that fits the normal map beside it where that is asked for.
+    pub(super) fn read(&self, map: &Path, builtin_size: Size) -> Result<SourceMap, Error> {
+        let options = self.fitted(map, builtin_size)?;
+        Ok(read_source(map, &options)?)
+    }
+
+    /// Describes a picture.
+    pub(super) fn describe(&self, picture: &Path, builtin_size: Size) -> Result<PictureReport, Error> {
+        describe_picture(picture, &self.fitted(picture, builtin_size)?)
+    }
+
+    /// Options in the library's form, for a map and for built-in maps of this size.
+    fn fitted(&self, map: &Path, builtin_size: Size) -> Result<SourceOptions, Error> {
+        let options = self.options(builtin_size);
+        let Some(HeightScale::Fitted) = self.height_scale else {
+            if self.normal_map.is_some() {
+                super::warn(map, "is not fitted to `--normal-map`, as `--height-scale auto` is not there");
+            }
+            return Ok(options);
+        };
+        let Some(normals) = &self.normal_map else {
+            let reason = "--height-scale auto needs the normal map of the same surface, as --normal-map FILE";
+            return Err(Error::Request(reason.to_owned()));
+        };
+        let fit = fit_height_scale(map, normals, &options)?;
+        let (scale, correlation) = (fit.scale, fit.correlation);
+        let deep = if fit.invert { ", white deep" } else { "" };
+        super::say(
+            map,
+            &format!(
+                "height scale {scale:.4}{deep} fits the normal map (slopes correlate by {correlation:.2})"
+            ),
+        );
+        Ok(SourceOptions { height_scale: Some(scale), invert: fit.invert, ..options })
+    }
+
+    fn options(&self, builtin_size: Size) -> SourceOptions {
         SourceOptions {
             kind: self.from.map(|from| match from {
                 From::Normal => SourceKind::Normal,
                 From::Height => SourceKind::Height,
             }),
             convention: match self.convention {
-                ConventionArgument::Opengl => Convention::OpenGl,
-                ConventionArgument::Directx => Convention::DirectX,
+                ConventionArgument::Auto => None,
+                ConventionArgument::Opengl => Some(Convention::OpenGl),
+                ConventionArgument::Directx => Some(Convention::DirectX),
             },
-            height_scale: self.height_scale,
+            height_scale: match self.height_scale {
+                Some(HeightScale::Given(scale)) => Some(scale),
+                Some(HeightScale::Fitted) | None => None,
+            },
             invert: self.invert,
             slope_filter: match self.slope_filter {
                 FilterArgument::Central => SlopeFilter::CentralDifference,

@@ -8,7 +8,7 @@ use ndfmap::choose::{Auto, Choice, Limit};
 use ndfmap::core::ndf::{AnyMethod, Encoding};
 use ndfmap::maps::attribute::{AttributeMap, Transfer, read_attribute};
 use ndfmap::maps::formats::to_write;
-use ndfmap::maps::source::{SourceMap, read_source};
+use ndfmap::maps::source::SourceMap;
 use ndfmap::maps::{ChannelLayout, MAX_ATTRIBUTES, WriteOptions};
 use ndfmap::{BakeJob, BakeReport, Error};
 
@@ -148,7 +148,7 @@ impl Bake {
         self.check()?;
         let terminal = Terminal::default();
         let start = Instant::now();
-        let map = read_source(&self.map, &self.source.options(self.builtin.size))?;
+        let map = self.source.read(&self.map, self.builtin.size)?;
         let size = map.surface.size();
         let attributes = self.attribute.iter().map(|a| read_attribute(&a.path, a.transfer, size));
         let attributes = attributes.collect::<Result<Vec<AttributeMap>, _>>()?;

@@ -10,7 +10,7 @@ use ndfmap::core::grid::Size;
 use ndfmap::core::lookup::Lookups;
 use ndfmap::core::ndf::AnyMethod;
 use ndfmap::core::pyramid;
-use ndfmap::maps::source::{SourceMap, read_source};
+use ndfmap::maps::source::SourceMap;
 use ndfmap::maps::{MapError, atomic};
 use ndfmap::render::{Device, RenderJob, RenderReport, render};
 use ndfmap::report::{self, Pages, ReportFile};
@@ -89,7 +89,7 @@ impl Compare {
         if self.sparkle {
             check_drift(self.picture)?;
         }
-        let map = read_source(&self.map, &self.source.options(self.builtin.size))?;
+        let map = self.source.read(&self.map, self.builtin.size)?;
         for warning in &map.warnings {
             warn(&self.map, warning);
         }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use ndfmap::maps::formats::{read_file, read_ndf};
-use ndfmap::maps::source::{BUILTIN_PREFIX, read_source};
+use ndfmap::maps::source::BUILTIN_PREFIX;
 use ndfmap::{Error, inspect};
 use serde_json::{Map, Value};
 
@@ -39,9 +39,9 @@ impl Inspect {
                 return Err(Error::Request(format!("{file}: is no baked map: it has no texels to decode")));
             }
             (None, None) => {
-                let map = read_source(&self.file, &self.source.options(self.builtin.size))?;
-                map.warnings.iter().for_each(|warning| warn(&self.file, warning));
-                to_value(&inspect::describe_source(&map))?
+                let report = self.source.describe(&self.file, self.builtin.size)?;
+                report.warnings.iter().for_each(|warning| warn(&self.file, warning));
+                to_value(&report)?
             }
         };
         if json { print_json(&value) } else { print(&as_lines(&value)) }

@@ -103,6 +103,11 @@ fn warn(map: &Path, warning: &str) {
     eprintln!("ndfmap: warning: {}: {warning}", map.display());
 }
 
+/// Says something of a file on stderr that is no warning.
+fn say(map: &Path, words: &str) {
+    eprintln!("ndfmap: {}: {words}", map.display());
+}
+
 /// Says that a file is about to be replaced.
 fn say_if_replaced(path: &Path) {
     if path.exists() {

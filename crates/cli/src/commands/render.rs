@@ -16,7 +16,7 @@ use ndfmap::maps::atomic;
 use ndfmap::maps::formats::{WritePicture, picture_writer};
 use ndfmap::maps::formats::{read_file, read_ndf};
 use ndfmap::maps::picture::write_picture;
-use ndfmap::maps::source::{BUILTIN_PREFIX, read_source};
+use ndfmap::maps::source::BUILTIN_PREFIX;
 use ndfmap::render::{self, Frame, RenderJob, RenderReport};
 use ndfmap::report::{SheetPlan, contact_sheet};
 use ndfmap::scene::tone::Tone;
@@ -437,7 +437,7 @@ impl Render {
             (Some(baked), _) => Some(baked.into()),
             (None, Some(path)) => {
                 let size = self.map_size.unwrap_or(Size { width: 512, height: 512 });
-                let map = read_source(path, &self.source.options(size))?;
+                let map = self.source.read(path, size)?;
                 map.warnings.iter().for_each(|w| warn(path, w));
                 Some(map.surface.into())
             }

@@ -5,6 +5,7 @@
 //! a folder `textures`: files name the folders of whoever wrote them.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::{DMat3, DVec3, Vec2};
 use ndfmap_core::grid::Grid;
@@ -21,7 +22,7 @@ use super::material::{Factors, MetalRough, colours};
 use super::{MAX_ELEMENTS, ModelFormat, Parts};
 use crate::attribute::Transfer;
 use crate::formats::{read_file, read_image};
-use crate::source::{SourceOptions, source_of_image};
+use crate::source::{Convention, PictureKind, SourceOptions, identify, source_of_image};
 use crate::{Image, MapError, SourceKind};
 
 pub(super) const OBJ: ModelFormat = ModelFormat {
@@ -294,20 +295,32 @@ impl Look<'_> {
     }
 
     /// Normals of the normal map, or of a bump map that holds normals, as exporters of OBJ write them.
-    fn normals(&self, warnings: &mut Vec<String>) -> Result<Option<std::sync::Arc<dyn Surface>>, MapError> {
+    fn normals(&self, warnings: &mut Vec<String>) -> Result<Option<Arc<dyn Surface>>, MapError> {
         let (pbr, fbx) = (&self.material.pbr, &self.material.fbx);
-        let named = [&pbr.normal_map, &fbx.normal_map, &fbx.bump];
-        let Some(texture) = named.into_iter().find_map(texture) else { return Ok(None) };
+        let normal = [&pbr.normal_map, &fbx.normal_map].into_iter().find_map(texture);
+        let Some(texture) = normal.or_else(|| texture(&fbx.bump)) else { return Ok(None) };
         let Some((file, image)) = self.image(texture, warnings)? else { return Ok(None) };
-        let options = SourceOptions { wraps: wraps(texture), ..SourceOptions::default() };
-        let map = source_of_image(&file, image, String::new(), &options)?;
         let name = &*self.material.element.name;
-        if map.source.kind == SourceKind::Height {
+        if normal.is_none() && identify(&file, &image).kind != PictureKind::Normal {
             warnings.push(format!(
-                "heights of `{name}` are left out, as their scale is not in the file: `--map` lays them on"
+                "bumps of `{name}` are no normal map, and are left out: their scale is not in the file, and \
+                 `--map` lays them on"
             ));
             return Ok(None);
         }
+        // Neither format says where green points.
+        let options = SourceOptions {
+            kind: Some(SourceKind::Normal),
+            wraps: wraps(texture),
+            ..SourceOptions::default()
+        };
+        let map = source_of_image(&file, image.clone(), String::new(), &options).or_else(|_| {
+            warnings.push(format!(
+                "normal map of `{name}` does not tell whether green points up, and is taken so"
+            ));
+            let options = SourceOptions { convention: Some(Convention::OpenGl), ..options };
+            source_of_image(&file, image, String::new(), &options)
+        })?;
         warnings.extend(map.warnings.iter().map(|w| format!("normal map of `{name}` {w}")));
         Ok(Some(map.surface))
     }

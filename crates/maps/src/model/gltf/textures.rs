@@ -14,7 +14,7 @@ use super::super::mirror::Mirrors;
 use super::document::{Opened, resource};
 use crate::attribute::Transfer;
 use crate::formats::read_image;
-use crate::source::{SourceOptions, source_of_image};
+use crate::source::{Convention, SourceOptions, source_of_image};
 use crate::{Image, MapError, SourceKind};
 
 /// A normal map with its x and y scaled, as `normalTexture.scale` asks.
@@ -84,8 +84,13 @@ impl Opened<'_> {
         let Some(normal) = material.normal_texture() else { return Ok(None) };
         let (file, image) = self.image(&normal.texture())?;
         let laying = Laying::of_normal(&normal);
-        let options =
-            SourceOptions { kind: Some(SourceKind::Normal), wraps: laying.wraps, ..SourceOptions::default() };
+        let options = SourceOptions {
+            kind: Some(SourceKind::Normal),
+            // Green is up in glTF (2.0, 3.9.3).
+            convention: Some(Convention::OpenGl),
+            wraps: laying.wraps,
+            ..SourceOptions::default()
+        };
         let map = source_of_image(&file, image, String::new(), &options)?;
         let name = material.name().unwrap_or("unnamed");
         warnings.extend(map.warnings.iter().map(|w| format!("normal map of `{name}` {w}")));
