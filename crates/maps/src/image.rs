@@ -52,6 +52,29 @@ impl Samples {
         self.gathered((0..area * channels).map(|i| i % channels * area + i / channels))
     }
 
+    /// Samples of texels whose channels come from these sources.
+    fn composed(&self, channels: usize, chosen: &[Component]) -> Self {
+        fn compose<T: Copy>(
+            texels: &[T],
+            channels: usize,
+            chosen: &[Component],
+            [zero, one]: [T; 2],
+        ) -> Vec<T> {
+            let sample = |texel: &[T], component: &Component| match component {
+                Component::Zero => zero,
+                Component::One => one,
+                Component::Channel(channel) => texel[*channel],
+            };
+            let texels = texels.chunks_exact(channels);
+            texels.flat_map(|texel| chosen.iter().map(move |component| sample(texel, component))).collect()
+        }
+        match self {
+            Self::U8(v) => Self::U8(compose(v, channels, chosen, [0, u8::MAX])),
+            Self::U16(v) => Self::U16(compose(v, channels, chosen, [0, u16::MAX])),
+            Self::F32(v) => Self::F32(compose(v, channels, chosen, [0.0, 1.0])),
+        }
+    }
+
     /// Number of samples.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -78,6 +101,8 @@ pub struct Image {
     pub channels: usize,
     /// All samples.
     pub samples: Samples,
+    /// True where the format says that samples run from -1 to 1. Other floats may or may not.
+    pub signed: bool,
     /// Warnings of the reader: oddities that do no harm.
     pub warnings: Vec<String>,
 }
@@ -96,8 +121,19 @@ impl Image {
                 format!("holds {found} samples where its header says {expected}"),
             ));
         }
-        Ok(Self { size, channels, samples, warnings: Vec::new() })
+        Ok(Self { size, channels, samples, signed: false, warnings: Vec::new() })
     }
+}
+
+/// Source of a channel of a composed picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Component {
+    /// The value 0.
+    Zero,
+    /// The largest value of integers, and 1 of floats.
+    One,
+    /// A channel.
+    Channel(usize),
 }
 
 /// Order in which a file holds its texels.
@@ -142,6 +178,12 @@ impl Image {
     pub(crate) fn channels(self, chosen: &[usize]) -> Self {
         let places = (0..self.size.area()).flat_map(|i| chosen.iter().map(move |c| i * self.channels + c));
         Self { channels: chosen.len(), samples: self.samples.gathered(places), ..self }
+    }
+
+    /// The picture whose channels come from these sources.
+    #[must_use]
+    pub(crate) fn composed(self, chosen: &[Component]) -> Self {
+        Self { channels: chosen.len(), samples: self.samples.composed(self.channels, chosen), ..self }
     }
 }
 

@@ -1,4 +1,4 @@
-//! Common part of the formats that the `image` crate decodes.
+//! Common part of the formats that other crates decode.
 
 use std::path::Path;
 
@@ -12,6 +12,13 @@ use crate::{Image, MapError, Samples};
 pub(super) struct Capacity {
     pub(super) bytes: usize,
     pub(super) texels_per_byte: usize,
+}
+
+/// Runs a decoder, some of whose own checks of a hostile file are assertions.
+pub(super) fn guarded<T>(path: &Path, decoder: &str, decode: impl FnOnce() -> T) -> Result<T, MapError> {
+    let damaged =
+        |_| MapError::invalid(path, format!("is damaged in a way that the {decoder} decoder cannot handle"));
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(decode)).map_err(damaged)
 }
 
 /// Decodes a picture of 8-bit grey, RGB or either with alpha. Alpha beside grey is left out, for two channels

@@ -22,7 +22,7 @@ use ndfmap_core::ndf::Encoding as Channels;
 use ndfmap_core::pyramid::{Precision, Pyramid, level_sizes};
 use ndfmap_scene::metrics::Picture;
 
-use super::{ChannelLayout, EncodedPicture, Format, WriteOptions, WritePicture};
+use super::{ChannelLayout, EncodedPicture, Format, WriteOptions, WritePicture, decoded};
 use crate::atomic::AtomicFile;
 use crate::header::{Source, SourceKind, VERSION};
 use crate::image::{MAX_TEXELS, check_size};
@@ -32,11 +32,10 @@ pub(super) const FORMAT: Format = Format {
     name: "OpenEXR",
     extensions: &["exr", "tx"],
     magic: &[b"\x76\x2f\x31\x01"],
-    read_image: Some(read_image),
     read_ndf: Some(read_ndf),
     write_ndf: Some(write_ndf),
     write_picture: Some(WritePicture::Linear(write_picture)),
-    ..Format::READ_ONLY
+    ..Format::read_by(read_image)
 };
 
 /// The attribute that holds our [`Header`].
@@ -71,12 +70,8 @@ fn check_header(path: &Path, bytes: &[u8]) -> Result<(), MapError> {
     Ok(())
 }
 
-/// Runs the crate's decoder, some of whose own checks of a hostile file are assertions.
 fn guarded<T>(path: &Path, decode: impl FnOnce() -> ::exr::error::Result<T>) -> Result<T, MapError> {
-    match std::panic::catch_unwind(std::panic::AssertUnwindSafe(decode)) {
-        Ok(result) => result.map_err(|e| MapError::invalid(path, e)),
-        Err(_) => Err(MapError::invalid(path, "is damaged in a way that the OpenEXR decoder cannot handle")),
-    }
+    decoded::guarded(path, "OpenEXR", decode)?.map_err(|e| MapError::invalid(path, e))
 }
 
 /// The headers of all parts, of which there is at least one.

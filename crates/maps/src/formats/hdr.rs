@@ -18,8 +18,7 @@ pub(super) const FORMAT: Format = Format {
     extensions: &["hdr", "pic"],
     // Followed by the name of the program.
     magic: &[b"#?"],
-    read_image: Some(read),
-    ..Format::READ_ONLY
+    ..Format::read_by(read)
 };
 
 fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {

@@ -11,13 +11,8 @@ use super::{
 };
 use crate::{Image, MapError};
 
-pub(super) const FORMAT: Format = Format {
-    name: "JPEG",
-    extensions: &["jpg", "jpeg"],
-    magic: &[b"\xFF\xD8\xFF"],
-    read_image: Some(read),
-    ..Format::READ_ONLY
-};
+pub(super) const FORMAT: Format =
+    Format { name: "JPEG", extensions: &["jpg", "jpeg"], magic: &[b"\xFF\xD8\xFF"], ..Format::read_by(read) };
 
 fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
     // The decoder fills missing parts with grey, and a map must not come out half invented.

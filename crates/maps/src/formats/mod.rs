@@ -4,15 +4,21 @@
 //! Every reader gets the whole file in memory (so nothing is larger than the file itself allows) and
 //! checks sizes before it allocates for them.
 
+#[cfg(feature = "basis")]
+mod basis;
+mod dds;
 mod decoded;
 pub mod exr;
 mod hdr;
 mod jpeg;
 pub mod ktx2;
 pub mod png;
+mod texels;
 mod tga;
 #[cfg(feature = "tiff")]
 mod tiff;
+#[cfg(feature = "webp")]
+mod webp;
 
 use std::path::Path;
 
@@ -89,7 +95,7 @@ pub struct Format {
     /// Signatures, the first bytes of such files; empty for a format without any.
     pub magic: &'static [&'static [u8]],
     /// Reads a picture.
-    pub read_image: Option<ReadImage>,
+    pub read_image: ReadImage,
     /// Reads a normal distribution map; `None` inside when the file is a plain picture.
     pub read_ndf: Option<ReadNdf>,
     /// Writes a normal distribution map.
@@ -101,17 +107,19 @@ pub struct Format {
 }
 
 impl Format {
-    /// Row of a format that is only read.
-    const READ_ONLY: Self = Self {
-        name: "",
-        extensions: &[],
-        magic: &[],
-        read_image: None,
-        read_ndf: None,
-        write_ndf: None,
-        open_sink: None,
-        write_picture: None,
-    };
+    /// Row of a format whose pictures this function reads, and that nothing is written in.
+    const fn read_by(read_image: ReadImage) -> Self {
+        Self {
+            name: "",
+            extensions: &[],
+            magic: &[],
+            read_image,
+            read_ndf: None,
+            write_ndf: None,
+            open_sink: None,
+            write_picture: None,
+        }
+    }
 }
 
 /// Every format that the crate was built with.
@@ -123,6 +131,11 @@ pub static TABLE: &[Format] = &[
     exr::FORMAT,
     hdr::FORMAT,
     ktx2::FORMAT,
+    dds::FORMAT,
+    #[cfg(feature = "basis")]
+    basis::FORMAT,
+    #[cfg(feature = "webp")]
+    webp::FORMAT,
     tga::FORMAT,
 ];
 
@@ -201,9 +214,5 @@ pub fn read_ndf(path: &Path, bytes: &[u8]) -> Result<Option<NdfMap>, MapError> {
 /// # Errors
 /// [`MapError`] when the file is damaged or holds no picture.
 pub fn read_image(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
-    let format = detect(path, bytes)?;
-    let read = format.read_image.ok_or_else(|| {
-        MapError::unsupported(path, "is already a baked map, or no map: `inspect` reads it")
-    })?;
-    read(path, bytes)
+    (detect(path, bytes)?.read_image)(path, bytes)
 }

@@ -15,9 +15,8 @@ pub(super) const FORMAT: Format = Format {
     name: "PNG",
     extensions: &["png"],
     magic: &[b"\x89PNG\r\n\x1a\n"],
-    read_image: Some(read),
     write_picture: Some(WritePicture::Display(encode)),
-    ..Format::READ_ONLY
+    ..Format::read_by(read)
 };
 
 /// Deflate cannot shrink below 1/1032 of its output.

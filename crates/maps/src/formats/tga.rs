@@ -12,8 +12,7 @@ use super::{
 use crate::image::check_size;
 use crate::{Image, MapError};
 
-pub(super) const FORMAT: Format =
-    Format { name: "TGA", extensions: &["tga"], read_image: Some(read), ..Format::READ_ONLY };
+pub(super) const FORMAT: Format = Format { name: "TGA", extensions: &["tga"], ..Format::read_by(read) };
 
 fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
     // Sides lie at offsets 12 and 14 of the 18-byte header; they are checked before the decoder sees them.

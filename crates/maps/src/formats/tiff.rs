@@ -20,8 +20,7 @@ pub(super) const FORMAT: Format = Format {
     name: "TIFF",
     extensions: &["tif", "tiff"],
     magic: &[b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"],
-    read_image: Some(read),
-    ..Format::READ_ONLY
+    ..Format::read_by(read)
 };
 
 /// Tag GDAL_NODATA: value, as text, of posts that were not measured.

@@ -259,11 +259,14 @@ fn is_swizzled(image: &Image) -> bool {
         && texels.any(|i| sample(i, 3) != sample(0, 3))
 }
 
-/// True where stored values are the components themselves, from -1 to 1; else they run from 0 to 1. Floats
-/// may be either: the decoding that makes more vectors of length one is right. Without z, values from 0 to 1
-/// lie around a half, and components around 0.
+/// True where stored values are the components themselves, from -1 to 1; else they run from 0 to 1. Floats of
+/// which the format says nothing may be either: the decoding that makes more vectors of length one is right.
+/// Without z, values from 0 to 1 lie around a half, and components around 0.
 fn is_signed(image: &Image, two_channels: bool) -> bool {
     let Samples::F32(values) = &image.samples else { return false };
+    if image.signed {
+        return true;
+    }
     if two_channels {
         let xy = values.chunks_exact(image.channels).flat_map(|texel| &texel[..2]);
         let (sum, count) =

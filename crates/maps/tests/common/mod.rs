@@ -68,6 +68,46 @@ pub(crate) fn exr() -> Vec<u8> {
     bytes.into_inner()
 }
 
+/// DDS file without compression, blue first.
+pub(crate) fn dds() -> Vec<u8> {
+    let mut header = [0_u32; 32];
+    header[0] = u32::from_le_bytes(*b"DDS ");
+    (header[1], header[3], header[4]) = (124, HEIGHT as u32, WIDTH as u32);
+    // Pixel format: its size, RGB, bits, masks.
+    (header[19], header[20], header[22]) = (32, 0x40, 24);
+    header[23..26].copy_from_slice(&[0xFF_0000, 0xFF00, 0xFF]);
+    let mut bytes: Vec<u8> = header.iter().flat_map(|word| word.to_le_bytes()).collect();
+    bytes.extend(rgb8().chunks(3).flat_map(|c| [c[2], c[1], c[0]]));
+    bytes
+}
+
+/// KTX2 file of plain RGB, without a data format descriptor.
+pub(crate) fn ktx2() -> Vec<u8> {
+    let header = ktx2::Header {
+        format: Some(ktx2::Format::R8G8B8_UNORM),
+        type_size: 1,
+        pixel_width: WIDTH as u32,
+        pixel_height: HEIGHT as u32,
+        pixel_depth: 0,
+        layer_count: 0,
+        face_count: 1,
+        level_count: 1,
+        supercompression_scheme: None,
+        index: ktx2::Index {
+            dfd_byte_offset: 0,
+            dfd_byte_length: 0,
+            kvd_byte_offset: 0,
+            kvd_byte_length: 0,
+            sgd_byte_offset: 0,
+            sgd_byte_length: 0,
+        },
+    };
+    let texels = rgb8();
+    let (byte_offset, byte_length) = (104, texels.len() as u64);
+    let level = ktx2::LevelIndex { byte_offset, byte_length, uncompressed_byte_length: byte_length };
+    [&header.as_bytes(), &level.as_bytes() as &[u8], &texels].concat()
+}
+
 /// Every picture format: file name and bytes of a normal map.
 pub(crate) fn pictures() -> Vec<(&'static str, Vec<u8>)> {
     use tiff::encoder::colortype::{RGB8, RGB16, RGB32Float};
@@ -87,6 +127,10 @@ pub(crate) fn pictures() -> Vec<(&'static str, Vec<u8>)> {
         ("rgb16.tif", tiff::<RGB16>(&sixteen)),
         ("float.tif", tiff::<RGB32Float>(&floats)),
         ("map.exr", exr()),
+        ("map.dds", dds()),
+        ("rgb8.ktx2", ktx2()),
+        ("map.webp", with_image_crate(image::ImageFormat::WebP)),
+        ("map.basis", include_bytes!("../cases/map.basis").to_vec()),
     ]
 }
 

@@ -1,22 +1,22 @@
-//! KTX2, the native container: a 2-D array texture, one array layer per RGBA layer, full mip chain.
+//! KTX2: the native container of maps, and a container of textures.
 //!
-//! The writer uses the `ktx2` crate's serialisers and writes level 0 in bands while it is being baked, so a
-//! map need never be in memory whole. The reader takes header, level index and key/value data by hand: the
-//! crate's `Reader` panics on a hostile data format descriptor, which we do not need. `docs/formats.md` has
-//! the layout.
+//! A map is a 2-D array texture, one array layer per RGBA layer, full mip chain. The writer uses the `ktx2`
+//! crate's serialisers and writes level 0 in bands while it is being baked, so a map need never be in memory
+//! whole. `docs/formats.md` has the layout.
 
-use std::io::{Read, Seek, SeekFrom, Write};
+mod container;
+mod picture;
+
+use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
 use ::ktx2::dfd::{Basic, Block};
-use ::ktx2::{
-    Format as VkFormat, Header as KtxHeader, Index, KeyValueDataIterator, LevelIndex, MAGIC,
-    SupercompressionScheme,
-};
+use ::ktx2::{Format as VkFormat, Header as KtxHeader, Index, LevelIndex, MAGIC, SupercompressionScheme};
 use ndfmap_core::bake::{LevelSink, Place};
 use ndfmap_core::grid::Size;
 use ndfmap_core::pyramid::{Layout, Precision, level_sizes};
 
+pub(super) use self::container::Container;
 use super::{ChannelLayout, Format, NdfSink, WriteOptions};
 use crate::atomic::AtomicFile;
 use crate::ndf_map::layout_of;
@@ -29,7 +29,7 @@ pub(super) const FORMAT: Format = Format {
     read_ndf: Some(read_ndf),
     write_ndf: Some(write_ndf),
     open_sink: Some(|path, header, layout| Ok(Box::new(Ktx2Sink::create(path, header, layout)?))),
-    ..Format::READ_ONLY
+    ..Format::read_by(picture::read)
 };
 
 /// The key that holds our [`Header`].
@@ -230,57 +230,21 @@ impl LevelSink for Ktx2Sink {
     }
 }
 
-/// Most bytes that a byte of Zstandard can stand for: a block of 128 KiB of one value takes four.
-const MOST_PER_BYTE: u64 = 32_768;
-
-/// Decompresses a level that must be `expected` bytes long; memory grows only as bytes come out.
-fn inflate(stored: &[u8], expected: u64) -> Result<Vec<u8>, String> {
-    if expected / MOST_PER_BYTE > stored.len() as u64 {
-        return Err(format!("{} bytes cannot hold {expected}", stored.len()));
-    }
-    let decoder = zstd::Decoder::new(stored).map_err(|e| e.to_string())?;
-    let mut bytes = Vec::new();
-    decoder.take(expected + 1).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
-    if bytes.len() as u64 == expected { Ok(bytes) } else { Err(format!("it does not hold {expected} bytes")) }
-}
-
-/// Reads a baked map; a sound KTX2 file without our key is an error that says so.
+/// Reads a baked map; `None` where the file lacks our key.
 fn read_ndf(path: &Path, bytes: &[u8]) -> Result<Option<NdfMap>, MapError> {
     let invalid = |reason: String| MapError::invalid(path, reason);
-    let truncated = || MapError::invalid(path, "is truncated: its KTX2 header points beyond its end");
-    let start: &[u8; KtxHeader::LENGTH] = bytes.first_chunk().ok_or_else(truncated)?;
-    let ktx = KtxHeader::from_bytes(start).map_err(|e| invalid(format!("has a bad KTX2 header: {e:?}")))?;
-    let slice = |offset: u64, length: u64| {
-        let end = offset.checked_add(length)?;
-        bytes.get(usize::try_from(offset).ok()?..usize::try_from(end).ok()?)
-    };
-    let kvd =
-        slice(ktx.index.kvd_byte_offset.into(), ktx.index.kvd_byte_length.into()).ok_or_else(truncated)?;
-    let text = KeyValueDataIterator::new(kvd).find(|(key, _)| *key == KEY).map(|(_, value)| value);
-    let Some(text) = text else {
-        return Err(MapError::unsupported(
-            path,
-            format!("is a KTX2 file without the key `{KEY}`: not a normal distribution map"),
-        ));
-    };
-    let text =
-        std::str::from_utf8(text).map_err(|e| invalid(format!("has a key `{KEY}` that is no text: {e}")))?;
-    let header = Header::from_json(path, text.trim_end_matches('\0'))?;
-    let compressed = match ktx.supercompression_scheme {
-        None => false,
-        Some(SupercompressionScheme::Zstandard) => true,
-        Some(other) => {
-            let reason = format!("is supercompressed ({other:?}); plain KTX2 and Zstandard are read");
-            return Err(MapError::unsupported(path, reason));
-        }
-    };
+    let file = Container::new(path, bytes)?;
+    let Some(text) = file.value(KEY)? else { return Ok(None) };
+    let header = Header::from_json(path, text)?;
+    file.is_compressed()?;
+    let ktx = &file.header;
     let precision = match ktx.format {
         Some(VkFormat::R16G16B16A16_SFLOAT) => Precision::Half,
         Some(VkFormat::R32G32B32A32_SFLOAT) => Precision::Single,
         other => {
             return Err(MapError::unsupported(
                 path,
-                format!("has texels of {other:?}; RGBA16F and RGBA32F are read"),
+                format!("has texels of {other:?}; a baked map is of RGBA16F or RGBA32F"),
             ));
         }
     };
@@ -299,23 +263,7 @@ fn read_ndf(path: &Path, bytes: &[u8]) -> Result<Option<NdfMap>, MapError> {
             return Err(invalid(format!("has a {what} of {found}; its key `{KEY}` says {expected}")));
         }
     }
-    let mut levels = Vec::with_capacity(sizes.len());
-    for (level, size) in sizes.iter().enumerate() {
-        let at = (KtxHeader::LENGTH + level * LevelIndex::LENGTH) as u64;
-        let index: &[u8; LevelIndex::LENGTH] =
-            slice(at, LevelIndex::LENGTH as u64).and_then(|s| s.first_chunk()).ok_or_else(truncated)?;
-        let index = LevelIndex::from_bytes(index);
-        let expected = level_bytes(&layout, *size);
-        let claimed = if compressed { index.uncompressed_byte_length } else { index.byte_length };
-        if claimed != expected {
-            return Err(invalid(format!("has {claimed} bytes in level {level}, where {expected} are due")));
-        }
-        let stored = slice(index.byte_offset, index.byte_length).ok_or_else(truncated)?;
-        levels.push(if compressed {
-            inflate(stored, expected).map_err(|why| invalid(format!("has a damaged level {level}: {why}")))?
-        } else {
-            stored.to_vec()
-        });
-    }
-    NdfMap::assemble(path, header, precision, levels).map(Some)
+    let levels = sizes.iter().enumerate();
+    let levels = levels.map(|(level, size)| Ok(file.level(level, level_bytes(&layout, *size))?.into_owned()));
+    NdfMap::assemble(path, header, precision, levels.collect::<Result<_, MapError>>()?).map(Some)
 }
