@@ -324,7 +324,7 @@ fn light_of(picture: &Picture) -> f64 {
 fn flip(picture: &Picture, truth: &Picture, exposure: f32) -> Option<f64> {
     let image = |p: &Picture| {
         let size = p.size();
-        let bytes = ndfmap_maps::picture::to_bytes(p, exposure);
+        let bytes = ndfmap_scene::metrics::to_bytes(p, exposure);
         nv_flip::FlipImageRgb8::with_data(
             size.width as u32,
             size.height as u32,

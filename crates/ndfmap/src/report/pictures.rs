@@ -2,8 +2,7 @@
 //! under them.
 
 use ndfmap_core::grid::Size;
-use ndfmap_maps::picture::to_bytes;
-use ndfmap_scene::metrics::{Picture, display};
+use ndfmap_scene::metrics::{Picture, display, to_bytes};
 
 use super::canvas::{Canvas, LETTER, LINE, Rgb, heat};
 use crate::Error;
