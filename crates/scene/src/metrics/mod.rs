@@ -1,7 +1,11 @@
 //! Metrics of pictures: how far two are apart, and how much a moving one sparkles.
 //!
 //! Pictures are linear RGB, high dynamic range; a *display value* is one of them times the exposure, clipped
-//! to 0..1 and encoded as sRGB. FLIP, the perceptual difference, comes from its own library and is not here.
+//! to 0..1 and encoded as sRGB.
+
+mod flip;
+
+pub use flip::{PixelsPerDegree, flip, flip_map};
 
 use glam::Vec3;
 use ndfmap_core::grid::{Grid, Size};
