@@ -53,14 +53,10 @@ pub(crate) fn rendering(report: &RenderReport) -> String {
     for (method, said) in report.methods() {
         text += &format!("{method:name$} {:>9.1}", said.frame_ms.median);
         if let Some(e) = said.error {
-            let or_dash = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+            let sparkle = e.sparkle.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
             text += &format!(
-                "  {:>11.4}  {:>11.3}  {:>10.3}  {:>6}  {:>7}",
-                e.color_error,
-                e.relative_l2,
-                e.brightness,
-                or_dash(e.flip),
-                or_dash(e.sparkle)
+                "  {:>11.4}  {:>11.3}  {:>10.3}  {:>6.3}  {sparkle:>7}",
+                e.color_error, e.relative_l2, e.brightness, e.flip
             );
         }
         text.push('\n');

@@ -7,7 +7,7 @@ use ndfmap_core::lookup::Lookups;
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::observe::Observer;
 use ndfmap_core::pyramid::Precision;
-use ndfmap_scene::metrics::{Picture, change, color_error, relative_l2};
+use ndfmap_scene::metrics::{Picture, change, color_error, flip, relative_l2};
 use ndfmap_scene::{Effort, Scene};
 use ndfmap_trace::{DRIFT_FRAMES, drifted};
 use serde::Serialize;
@@ -84,9 +84,8 @@ pub struct PictureErrors {
     pub color_error: f64,
     /// Light of the whole picture over the truth's.
     pub brightness: f64,
-    /// Mean FLIP; `None` where the crate is built without its feature `flip`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub flip: Option<f64>,
+    /// Mean FLIP of display values.
+    pub flip: f64,
     /// Change from frame to frame of a drift, over the truth's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sparkle: Option<f64>,
@@ -319,27 +318,6 @@ fn light_of(picture: &Picture) -> f64 {
     picture.texels().iter().map(|c| f64::from(c.element_sum())).sum()
 }
 
-/// Mean FLIP of display values, at the library's own distance to a screen.
-#[cfg(feature = "flip")]
-fn flip(picture: &Picture, truth: &Picture, exposure: f32) -> Option<f64> {
-    let image = |p: &Picture| {
-        let size = p.size();
-        let bytes = ndfmap_maps::picture::to_bytes(p, exposure);
-        nv_flip::FlipImageRgb8::with_data(
-            size.width as u32,
-            size.height as u32,
-            bytes.texels().as_flattened(),
-        )
-    };
-    let error = nv_flip::flip(image(truth), image(picture), nv_flip::DEFAULT_PIXELS_PER_DEGREE);
-    Some(f64::from(nv_flip::FlipPool::from_image(&error).mean()))
-}
-
-#[cfg(not(feature = "flip"))]
-fn flip(_picture: &Picture, _truth: &Picture, _exposure: f32) -> Option<f64> {
-    None
-}
-
 impl RenderReport {
     /// Mean over frames of a method's errors; `None` without a truth.
     #[must_use]
@@ -351,7 +329,7 @@ impl RenderReport {
             relative_l2: mean(|e| e.relative_l2),
             color_error: mean(|e| e.color_error),
             brightness: mean(|e| e.brightness),
-            flip: all[0].flip.map(|_| mean(|e| e.flip.unwrap_or(0.0))),
+            flip: mean(|e| e.flip),
             sparkle: all[0].sparkle.map(|_| mean(|e| e.sparkle.unwrap_or(0.0))),
         })
     }

@@ -2,8 +2,7 @@
 //! under them.
 
 use ndfmap_core::grid::Size;
-use ndfmap_maps::picture::to_bytes;
-use ndfmap_scene::metrics::{Picture, display};
+use ndfmap_scene::metrics::{Picture, display, to_bytes};
 
 use super::canvas::{Canvas, LETTER, LINE, Rgb, heat};
 use crate::Error;
@@ -95,9 +94,8 @@ pub fn contact_sheet(report: &RenderReport, title: &str) -> Result<Vec<u8>, Erro
 }
 
 fn lines_of(e: PictureErrors) -> [String; 2] {
-    let flip = e.flip.map_or_else(String::new, |f| format!("flip {f:.3} "));
-    let sparkle = e.sparkle.map_or_else(String::new, |s| format!("sparkle {s:.2}"));
-    [format!("color {:.4} l2 {:.3}", e.color_error, e.relative_l2), flip + &sparkle]
+    let sparkle = e.sparkle.map_or_else(String::new, |s| format!(" sparkle {s:.2}"));
+    [format!("color {:.4} l2 {:.3}", e.color_error, e.relative_l2), format!("flip {:.3}{sparkle}", e.flip)]
 }
 
 fn paint(canvas: &mut Canvas, at: (usize, usize), picture: &Picture, exposure: f32) {

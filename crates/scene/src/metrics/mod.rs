@@ -1,11 +1,15 @@
 //! Metrics of pictures: how far two are apart, and how much a moving one sparkles.
 //!
 //! Pictures are linear RGB, high dynamic range; a *display value* is one of them times the exposure, clipped
-//! to 0..1 and encoded as sRGB. FLIP, the perceptual difference, comes from its own library and is not here.
+//! to 0..1 and encoded as sRGB.
+
+mod flip;
+
+pub use flip::{PixelsPerDegree, flip, flip_map};
 
 use glam::Vec3;
-
-use ndfmap_core::grid::Grid;
+use ndfmap_core::grid::{Grid, Size};
+use rayon::prelude::*;
 
 /// A picture in linear RGB.
 pub type Picture = Grid<Vec3>;
@@ -21,6 +25,17 @@ pub fn display_value(linear: f32) -> f32 {
 #[must_use]
 pub fn display(colour: Vec3, exposure: f32) -> Vec3 {
     Vec3::from_array((colour * exposure).to_array().map(display_value))
+}
+
+/// Display values in 8 bits.
+#[must_use]
+pub fn to_bytes(picture: &Picture, exposure: f32) -> Grid<[u8; 3]> {
+    let byte = |v: f32| (v * 255.0).round() as u8;
+    by_rows(picture.size(), |y, row: &mut [[u8; 3]]| {
+        for (bytes, colour) in row.iter_mut().zip(picture.row(y)) {
+            *bytes = display(*colour, exposure).to_array().map(byte);
+        }
+    })
 }
 
 /// `|a - truth| / |truth|` over all pixels and channels of the linear pictures; `|a|` where the truth is
@@ -63,6 +78,13 @@ pub fn change(frames: &[Picture], exposure: f32) -> f64 {
     sum / (3 * pixels * frames.len().saturating_sub(1).max(1)) as f64
 }
 
+/// Grid whose rows are filled in parallel, each by itself, so the same for any number of threads.
+fn by_rows<T: Clone + Default + Send>(size: Size, fill: impl Fn(usize, &mut [T]) + Sync) -> Grid<T> {
+    let mut texels = vec![T::default(); size.area()];
+    texels.par_chunks_mut(size.width).enumerate().for_each(|(y, row)| fill(y, row));
+    Grid::from_vec(size, texels).unwrap_or_else(|| unreachable!("rows are as wide as the grid"))
+}
+
 /// Pixels of two pictures of one size.
 fn pairs<'a>(a: &'a Picture, b: &'a Picture) -> impl Iterator<Item = (Vec3, Vec3)> + 'a {
     assert_eq!(a.size(), b.size(), "pictures that are compared have one size");
@@ -72,7 +94,6 @@ fn pairs<'a>(a: &'a Picture, b: &'a Picture) -> impl Iterator<Item = (Vec3, Vec3
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ndfmap_core::grid::Size;
 
     fn flat(value: f32) -> Picture {
         Grid::from_fn(Size { width: 3, height: 2 }, |_, _| Vec3::splat(value))
