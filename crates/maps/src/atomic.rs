@@ -37,10 +37,7 @@ impl AtomicFile {
         if target.is_dir() {
             return Err(MapError::invalid(target, "is a folder, not a file"));
         }
-        let folder = match target.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
+        let folder = folder_of(target);
         if !folder.is_dir() {
             return Err(MapError::invalid(target, format!("there is no folder {}", folder.display())));
         }
@@ -52,6 +49,14 @@ impl AtomicFile {
         let (file, temporary) = made.into_parts();
         unfinished().push(temporary.to_path_buf());
         Ok(Self { file, temporary: Some(temporary), target: target.to_owned() })
+    }
+
+    /// Opens a further file in the same folder, without a name, for as long as it stays open.
+    ///
+    /// # Errors
+    /// [`MapError`] when the folder does not take it.
+    pub fn scratch(&self) -> Result<File, MapError> {
+        tempfile::tempfile_in(folder_of(&self.target)).map_err(|e| MapError::io(&self.target, e))
     }
 
     /// The file to write to.
@@ -76,6 +81,10 @@ impl AtomicFile {
         forget(&name);
         renamed
     }
+}
+
+fn folder_of(target: &Path) -> &Path {
+    target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 fn forget(name: &Path) {
