@@ -413,29 +413,54 @@ fn heights_too_large_for_half_floats_are_refused() {
     assert_eq!(baked["width"], 4);
 }
 
+/// Whether a process has begun to write in a folder, under a name or on Linux without any.
 #[cfg(unix)]
-#[test]
-fn interrupted_bakes_leave_nothing() {
+fn writes_in(process: u32, folder: &Path) -> bool {
+    let open = std::fs::read_dir(format!("/proc/{process}/fd")).into_iter().flatten();
+    let mut files = open.filter_map(|descriptor| std::fs::read_link(descriptor.ok()?.path()).ok());
+    files.any(|file| file.starts_with(folder)) || std::fs::read_dir(folder).unwrap().count() > 0
+}
+
+/// Ends a long bake by a signal while it writes; returns its exit status, unless the signal itself ended it,
+/// and the number of files that it left.
+#[cfg(unix)]
+fn end_a_bake(signal: &str, more: &[&str]) -> (Option<i32>, usize) {
     use std::process::{Command, Stdio};
     let folder = tempfile::tempdir().unwrap();
-    let output = folder.path().join("big.ktx2");
     // Factors by integration take long enough to be caught in the act.
     let mut child = Command::new(env!("CARGO_BIN_EXE_ndfmap"))
-        .args(["bake", "builtin:foil", "--size", "4096", "-m", "ndm:gaussian:integrated", "-o"])
-        .arg(&output)
+        .args(["bake", "builtin:foil", "--size", "4096", "-m", "ndm:gaussian:integrated"])
+        .args(more)
+        .arg("-o")
+        .arg(folder.path().join("big.ktx2"))
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    let begun = || std::fs::read_dir(folder.path()).unwrap().count() > 0;
+    let begun = || writes_in(child.id(), folder.path());
     let start = std::time::Instant::now();
     while !begun() && start.elapsed().as_secs() < 60 {
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
     assert!(begun(), "the bake never began to write");
-    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-    assert_eq!(child.wait().unwrap().code(), Some(130));
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+    let status = child.wait().unwrap();
+    assert!(!status.success(), "the bake was over before the signal");
+    (status.code(), std::fs::read_dir(folder.path()).unwrap().count())
+}
+
+#[cfg(unix)]
+#[test]
+fn interrupted_bakes_leave_nothing() {
+    assert_eq!(end_a_bake("-INT", &[]), (Some(130), 0));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn killed_bakes_leave_nothing() {
+    for more in [&[] as &[&str], &["--zstd"]] {
+        assert_eq!(end_a_bake("-KILL", more), (None, 0), "{more:?}");
+    }
 }
 
 #[test]

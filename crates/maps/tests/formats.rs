@@ -6,7 +6,7 @@ mod common;
 
 use std::path::Path;
 
-use common::{HEIGHT, WIDTH, baked, pictures, png, rgb8};
+use common::{HEIGHT, WIDTH, baked, baked_at, pictures, png, rgb8};
 use glam::Vec3;
 use ndfmap_core::bake::{LevelSink, Place};
 use ndfmap_core::grid::{Grid, Size};
@@ -130,15 +130,19 @@ fn missing_files_folders_and_strangers_are_named() {
     assert!(error(&other).contains("is of no known format; known are PNG, JPEG"));
 }
 
-/// Row by row, as a bake does it.
-fn write_in_rows(path: &Path, map: &NdfMap) -> u64 {
-    let p = &map.pyramid;
+/// In bands of rows, all layers of a band one after another, as a bake does it.
+fn write_in_rows(path: &Path, map: &NdfMap, options: &WriteOptions) -> u64 {
+    let (p, layout) = (&map.pyramid, map.pyramid.layout());
     let open = to_write(path).unwrap().open_sink.unwrap();
-    let mut sink = open(path, &map.header, p.layout()).unwrap();
-    for level in 0..p.sizes().len() {
-        let layers = p.level_bytes(level).chunks_exact(p.level_bytes(level).len() / p.layers());
-        for (layer, bytes) in layers.enumerate() {
-            sink.write_rows(Place { level, layer, row: 0 }, bytes).unwrap();
+    let mut sink = open(path, &map.header, layout, options).unwrap();
+    for (level, size) in p.sizes().iter().enumerate() {
+        let (rows, row_bytes) = (5, layout.layer_bytes(Size { height: 1, ..*size }));
+        for row in (0..size.height).step_by(rows) {
+            for (layer, bytes) in p.level_bytes(level).chunks_exact(row_bytes * size.height).enumerate() {
+                let end = (row + rows).min(size.height);
+                let band = &bytes[row * row_bytes..end * row_bytes];
+                sink.write_rows(Place { level, layer, row }, band).unwrap();
+            }
         }
     }
     sink.finish().unwrap()
@@ -154,7 +158,7 @@ fn baked_maps_come_back_bit_for_bit() {
                 let path = folder.path().join(name);
                 let zstd = (name == "small.ktx2").then_some(5);
                 let length = match name {
-                    "rows.ktx2" => write_in_rows(&path, &map),
+                    "rows.ktx2" => write_in_rows(&path, &map, &WriteOptions::default()),
                     _ => map.save(&path, &WriteOptions { zstd, ..WriteOptions::default() }).unwrap(),
                 };
                 assert_eq!(length, std::fs::metadata(&path).unwrap().len(), "{name}");
@@ -162,6 +166,60 @@ fn baked_maps_come_back_bit_for_bit() {
                 assert!(back == map, "{method} {precision:?} {name}");
             }
         }
+    }
+}
+
+#[test]
+fn zstandard_gives_the_same_bytes_in_rows_as_whole_by_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let size = |width, height| Size { width, height };
+    for (size, method, precision, strengths) in [
+        (size(1, 1), "slopes", Precision::Half, &[3] as &[i32]),
+        (size(96, 33), "naive", Precision::Single, &[1, 3, 22]),
+        (size(200, 145), "vmf:3", Precision::Half, &[1, 3, 19]),
+        // 14 MB: jobs are of 2 MiB at strength 1 and of 8 MiB at strength 3.
+        (size(1000, 900), "slopes", Precision::Half, &[1, 3]),
+    ] {
+        let map = baked_at(size, method, "foil", precision);
+        for zstd in strengths {
+            let options = WriteOptions { zstd: Some(*zstd), ..WriteOptions::default() };
+            let mut first: Option<Vec<u8>> = None;
+            for threads in [1, 2, 5] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                for (name, in_rows) in [("rows.ktx2", true), ("whole.ktx2", false)] {
+                    let path = folder.path().join(name);
+                    let length = pool.install(|| match in_rows {
+                        true => write_in_rows(&path, &map, &options),
+                        false => map.save(&path, &options).unwrap(),
+                    });
+                    let bytes = read_file(&path).unwrap();
+                    assert_eq!(length, bytes.len() as u64);
+                    let same = first.get_or_insert_with(|| bytes.clone()) == &bytes;
+                    assert!(same, "{size:?} {method} {zstd}: {name} by {threads} threads");
+                }
+            }
+            let bytes = first.unwrap();
+            assert!(read_ndf(Path::new("a.ktx2"), &bytes).unwrap().unwrap() == map);
+            check_frames(&bytes, &map);
+        }
+    }
+}
+
+/// Checks that each level is one Zstandard frame that says how much it holds (RFC 8878, section 3.1.1.1), and
+/// that levels fill the file, smallest first, to its end (KTX 2.0, "Mip Level Array").
+fn check_frames(bytes: &[u8], map: &NdfMap) {
+    let number = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap()) as usize;
+    let mut end = bytes.len();
+    for level in 0..map.pyramid.sizes().len() {
+        // The level index begins at byte 80: offset, length, length once inflated.
+        let index = 80 + 24 * level;
+        let (start, length) = (number(index), number(index + 8));
+        assert_eq!(start + length, end);
+        end = start;
+        let (frame, held) = (&bytes[start..start + length], map.pyramid.level_bytes(level).len());
+        assert_eq!(number(index + 16), held);
+        assert_eq!(zstd::zstd_safe::get_frame_content_size(frame).unwrap(), Some(held as u64));
+        assert_eq!(zstd::zstd_safe::find_frame_compressed_size(frame).unwrap(), length);
     }
 }
 

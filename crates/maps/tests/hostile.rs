@@ -49,7 +49,7 @@ fn ktx2() -> Vec<u8> {
     let bake = Bake::new(&*map.surface, &*method);
     let header = baked("slopes", "armour", Precision::Half).header;
     let open = to_write(&path).unwrap().open_sink.unwrap();
-    let mut sink = open(&path, &header, bake.layout()).unwrap();
+    let mut sink = open(&path, &header, bake.layout(), &WriteOptions::default()).unwrap();
     bake.run(&mut sink).unwrap();
     sink.finish().unwrap();
     std::fs::read(&path).unwrap()

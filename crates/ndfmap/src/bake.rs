@@ -64,7 +64,7 @@ pub struct BakeSeconds {
     pub read: f64,
     /// Baking, and writing with it where rows go straight into the file.
     pub bake: f64,
-    /// Writing, or giving the finished file its name.
+    /// Writing, or only compressing the finished rows, or only giving the finished file its name.
     pub write: f64,
 }
 
@@ -168,25 +168,24 @@ impl<'a> BakeJob<'a> {
     pub fn save(&self, path: &Path, options: &WriteOptions) -> Result<BakeReport, Error> {
         self.check()?;
         let format = to_write(path)?;
-        let (compressed, bumpslopes) =
-            (options.zstd.is_some(), options.channels == ChannelLayout::Bumpslopes);
+        let bumpslopes = options.channels == ChannelLayout::Bumpslopes;
         let exr = format.extensions.contains(&"exr");
         // Known before the minutes of baking.
         if bumpslopes && (!exr || self.method.encoding() != Encoding::SlopeMoments) {
             let why = "the bumpslopes layout needs an output ending in .exr and `--method slopes`";
             return Err(Error::Request(why.to_owned()));
         }
-        if compressed && exr {
+        if options.zstd.is_some() && exr {
             return Err(Error::Request("Zstandard is for KTX2; an EXR is compressed as it is".to_owned()));
         }
         let start = Instant::now();
-        let plain = !compressed && !bumpslopes;
-        let (bytes, baked) = match format.open_sink.filter(|_| plain) {
-            // Rows go straight into the file, so writing counts as baking; only the rename remains.
+        let (bytes, baked) = match format.open_sink {
+            // Rows go straight into a file, so writing counts as baking; what remains is to compress it, if
+            // asked for, and to name it.
             Some(open) => {
                 let values = self.values();
                 let bake = self.begin(&values);
-                let mut sink = open(path, &self.header(), bake.layout())?;
+                let mut sink = open(path, &self.header(), bake.layout(), options)?;
                 let report = bake.run(&mut sink)?;
                 refuse_overflow(report, path)?;
                 let baked = start.elapsed().as_secs_f64();

@@ -40,7 +40,7 @@ pub type ReadNdf = fn(&Path, &[u8]) -> Result<Option<NdfMap>, MapError>;
 pub type WriteNdf = fn(&Path, &NdfMap, &WriteOptions) -> Result<u64, MapError>;
 
 /// Opens a file that a map is baked into, row by row.
-pub type OpenSink = fn(&Path, &Header, Layout) -> Result<Box<dyn NdfSink>, MapError>;
+pub type OpenSink = fn(&Path, &Header, Layout, &WriteOptions) -> Result<Box<dyn NdfSink>, MapError>;
 
 /// Bytes of a picture's file, or the failure of the encoder.
 pub type EncodedPicture = Result<Vec<u8>, String>;
@@ -56,7 +56,7 @@ pub enum WritePicture {
 
 /// File that a map is being baked into. Nothing of it is left when it is dropped unfinished.
 pub trait NdfSink: LevelSink<Error = MapError> {
-    /// Gives the file its name; returns its length in bytes.
+    /// Completes the file, which may mean to compress it, and gives it its name; returns its length in bytes.
     ///
     /// # Errors
     /// [`MapError`] when it cannot be completed.
@@ -100,7 +100,7 @@ pub struct Format {
     pub read_ndf: Option<ReadNdf>,
     /// Writes a normal distribution map.
     pub write_ndf: Option<WriteNdf>,
-    /// Opens a file to bake into, in the format's plain form.
+    /// Opens a file to bake into.
     pub open_sink: Option<OpenSink>,
     /// Writes a rendered picture.
     pub write_picture: Option<WritePicture>,

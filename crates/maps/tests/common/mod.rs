@@ -136,7 +136,12 @@ pub(crate) fn pictures() -> Vec<(&'static str, Vec<u8>)> {
 
 /// A baked map of the built-in foil or, for heights, armour.
 pub(crate) fn baked(method: &str, builtin: &str, precision: Precision) -> NdfMap {
-    let options = SourceOptions { builtin_size: Size { width: 21, height: 13 }, ..Default::default() };
+    baked_at(Size { width: 21, height: 13 }, method, builtin, precision)
+}
+
+/// The same at any size.
+pub(crate) fn baked_at(size: Size, method: &str, builtin: &str, precision: Precision) -> NdfMap {
+    let options = SourceOptions { builtin_size: size, ..Default::default() };
     let map = read_source(format!("builtin:{builtin}").as_ref(), &options).unwrap();
     assert!(procedural::find(builtin).is_some());
     let method = method.parse::<AnyMethod>().unwrap();
@@ -144,8 +149,8 @@ pub(crate) fn baked(method: &str, builtin: &str, precision: Precision) -> NdfMap
     let header = Header {
         version: VERSION,
         method: method.to_string(),
-        width: 21,
-        height: 13,
+        width: size.width,
+        height: size.height,
         wrap: Header::spell_wraps(map.surface.wraps()),
         encoding: method.encoding().name().to_owned(),
         attributes: Vec::new(),

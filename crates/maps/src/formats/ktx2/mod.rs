@@ -1,13 +1,15 @@
 //! KTX2: the native container of maps, and a container of textures.
 //!
 //! A map is a 2-D array texture, one array layer per RGBA layer, full mip chain. The writer uses the `ktx2`
-//! crate's serialisers and writes level 0 in bands while it is being baked, so a map need never be in memory
-//! whole. `docs/formats.md` has the layout.
+//! crate's serialisers and takes rows while they are being baked, so a map need never be in memory whole.
+//! Zstandard needs a level in its order, layer by layer, where a bake makes all layers of a band at once: rows
+//! lie in a plain file without a name until they are compressed. `docs/formats.md` has the layout.
 
 mod container;
 mod picture;
 
-use std::io::{Seek, SeekFrom, Write};
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use ::ktx2::dfd::{Basic, Block};
@@ -28,7 +30,7 @@ pub(super) const FORMAT: Format = Format {
     magic: &[&MAGIC],
     read_ndf: Some(read_ndf),
     write_ndf: Some(write_ndf),
-    open_sink: Some(|path, header, layout| Ok(Box::new(Ktx2Sink::create(path, header, layout)?))),
+    open_sink: Some(open_sink),
     ..Format::read_by(picture::read)
 };
 
@@ -125,6 +127,13 @@ impl Front {
         bytes.extend(kvd);
         Ok(Self { bytes, levels, length: end })
     }
+
+    /// Front of a file that is not compressed.
+    fn plain(path: &Path, header: &Header, layout: Layout) -> Result<Self, MapError> {
+        let stored: Vec<u64> =
+            level_sizes(layout.size).iter().map(|size| level_bytes(&layout, *size)).collect();
+        Self::new(path, header, layout, None, &stored)
+    }
 }
 
 /// Bytes of all layers of a level.
@@ -132,102 +141,202 @@ fn level_bytes(layout: &Layout, size: Size) -> u64 {
     (layout.layer_bytes(size) * layout.layers) as u64
 }
 
+/// Refuses channels that are not our own.
+fn check_channels(path: &Path, options: &WriteOptions) -> Result<(), MapError> {
+    if options.channels == ChannelLayout::Native {
+        return Ok(());
+    }
+    Err(MapError::unsupported(path, "the bumpslopes layout needs an output ending in .exr"))
+}
+
+/// Opens a file to bake into, compressed or plain.
+fn open_sink(
+    path: &Path,
+    header: &Header,
+    layout: Layout,
+    options: &WriteOptions,
+) -> Result<Box<dyn NdfSink>, MapError> {
+    check_channels(path, options)?;
+    Ok(match options.zstd {
+        None => Box::new(PlainSink::create(path, header, layout)?),
+        Some(zstd) => Box::new(ZstdSink::create(CompressedFile::create(path, header, layout, zstd)?)?),
+    })
+}
+
 /// Writes a map, compressed or plain.
 fn write_ndf(path: &Path, map: &NdfMap, options: &WriteOptions) -> Result<u64, MapError> {
-    if options.channels != ChannelLayout::Native {
-        return Err(MapError::unsupported(path, "the bumpslopes layout needs an output ending in .exr"));
+    check_channels(path, options)?;
+    let (p, layout) = (&map.pyramid, map.pyramid.layout());
+    if let Some(zstd) = options.zstd {
+        let file = CompressedFile::create(path, &map.header, layout, zstd)?;
+        return file.write(|level| Ok(p.level_bytes(level)));
     }
-    if let Some(level) = options.zstd {
-        return write_compressed(path, map, level);
-    }
-    let mut sink = Ktx2Sink::create(path, &map.header, map.pyramid.layout())?;
-    let (sizes, layers) = (map.pyramid.sizes(), map.pyramid.layers());
-    for level in 0..sizes.len() {
-        let bytes = map.pyramid.level_bytes(level);
-        for (layer, bytes) in bytes.chunks_exact(bytes.len() / layers).enumerate() {
+    let mut sink = PlainSink::create(path, &map.header, layout)?;
+    for level in 0..p.sizes().len() {
+        let bytes = p.level_bytes(level);
+        for (layer, bytes) in bytes.chunks_exact(bytes.len() / layout.layers).enumerate() {
             sink.write_rows(Place { level, layer, row: 0 }, bytes)?;
         }
     }
     sink.complete()
 }
 
-/// Writes a map with Zstandard supercompression, at a level from 1 (fast) to 22; returns the file's length.
-///
-/// At every compression level the bytes are the same for any number of threads: the library cuts its jobs by
-/// size.
-fn write_compressed(path: &Path, map: &NdfMap, level: i32) -> Result<u64, MapError> {
-    let io = |e| MapError::io(path, e);
-    let p = &map.pyramid;
-    let layout = p.layout();
-    let mut compressor = zstd::bulk::Compressor::new(level).map_err(io)?;
-    compressor.multithread(rayon::current_num_threads().max(1) as u32).map_err(io)?;
-    let compressed: Result<Vec<Vec<u8>>, _> =
-        (0..p.sizes().len()).map(|level| compressor.compress(p.level_bytes(level))).collect();
-    let compressed = compressed.map_err(io)?;
-    let stored: Vec<u64> = compressed.iter().map(|c| c.len() as u64).collect();
-    let scheme = Some(SupercompressionScheme::Zstandard);
-    let front = Front::new(path, &map.header, layout, scheme, &stored)?;
-    let mut file = AtomicFile::create(path)?;
-    let mut write = |bytes: &[u8]| file.file().write_all(bytes).map_err(io);
-    write(&front.bytes)?;
-    compressed.iter().rev().try_for_each(|level| write(level))?;
-    file.file().flush().map_err(io)?;
-    file.finish()?;
-    Ok(front.length)
+fn write_at(mut file: &File, offset: u64, bytes: &[u8]) -> io::Result<()> {
+    file.seek(SeekFrom::Start(offset))?;
+    file.write_all(bytes)
 }
 
-/// Writes a KTX2 file while its levels are being baked.
+/// Places of rows in a plain file.
 #[derive(Debug)]
-struct Ktx2Sink {
-    file: AtomicFile,
+struct Rows {
     layout: Layout,
     /// Size and first byte of each level.
     levels: Vec<(Size, u64)>,
+}
+
+impl Rows {
+    fn new(layout: Layout, front: Front) -> Self {
+        Self { layout, levels: level_sizes(layout.size).into_iter().zip(front.levels).collect() }
+    }
+
+    fn write(&self, file: &File, place: Place, bytes: &[u8]) -> io::Result<()> {
+        let (size, start) = self.levels[place.level];
+        let row = self.layout.layer_bytes(Size { height: 1, ..size });
+        let offset = place.layer * self.layout.layer_bytes(size) + place.row * row;
+        write_at(file, start + offset as u64, bytes)
+    }
+
+    /// Reader of a level, from its first byte to its last.
+    fn read<'a>(&self, mut file: &'a File, level: usize) -> io::Result<impl Read + use<'a>> {
+        let (size, start) = self.levels[level];
+        file.seek(SeekFrom::Start(start))?;
+        let capacity = zstd::Encoder::<File>::recommended_input_size();
+        Ok(BufReader::with_capacity(capacity, file.take(level_bytes(&self.layout, size))))
+    }
+}
+
+/// Writes a plain file while its levels are being baked.
+#[derive(Debug)]
+struct PlainSink {
+    file: AtomicFile,
+    rows: Rows,
     length: u64,
 }
 
-impl Ktx2Sink {
+impl PlainSink {
     /// Opens the file and writes all but the levels.
     fn create(path: &Path, header: &Header, layout: Layout) -> Result<Self, MapError> {
-        let sizes = level_sizes(layout.size);
-        let stored: Vec<u64> = sizes.iter().map(|size| level_bytes(&layout, *size)).collect();
-        let front = Front::new(path, header, layout, None, &stored)?;
-        let levels = sizes.into_iter().zip(front.levels).collect();
-        let mut sink = Self { file: AtomicFile::create(path)?, layout, levels, length: front.length };
-        sink.write_at(0, &front.bytes)?;
-        Ok(sink)
-    }
-
-    fn write_at(&mut self, offset: u64, bytes: &[u8]) -> Result<(), MapError> {
-        let file = self.file.file();
-        let written = file.seek(SeekFrom::Start(offset)).and_then(|_| file.write_all(bytes));
-        written.map_err(|e| MapError::io(self.file.target(), e))
+        let front = Front::plain(path, header, layout)?;
+        let mut file = AtomicFile::create(path)?;
+        write_at(file.file(), 0, &front.bytes).map_err(|e| MapError::io(path, e))?;
+        Ok(Self { file, length: front.length, rows: Rows::new(layout, front) })
     }
 
     /// Gives the file its name; returns its length in bytes.
-    fn complete(mut self) -> Result<u64, MapError> {
-        let completed = self.file.file().flush();
-        completed.map_err(|e| MapError::io(self.file.target(), e))?;
+    fn complete(self) -> Result<u64, MapError> {
         self.file.finish()?;
         Ok(self.length)
     }
 }
 
-impl NdfSink for Ktx2Sink {
+impl NdfSink for PlainSink {
     fn finish(self: Box<Self>) -> Result<u64, MapError> {
         self.complete()
     }
 }
 
-impl LevelSink for Ktx2Sink {
+impl LevelSink for PlainSink {
     type Error = MapError;
 
     fn write_rows(&mut self, place: Place, bytes: &[u8]) -> Result<(), MapError> {
-        let (size, start) = self.levels[place.level];
-        let row = self.layout.layer_bytes(Size { height: 1, ..size });
-        let offset = place.layer * self.layout.layer_bytes(size) + place.row * row;
-        self.write_at(start + offset as u64, bytes)
+        let written = self.rows.write(self.file.file(), place, bytes);
+        written.map_err(|e| MapError::io(self.file.target(), e))
     }
+}
+
+/// Keeps rows in a plain file without a name while they are being baked, and then compresses them.
+#[derive(Debug)]
+struct ZstdSink {
+    plain: File,
+    rows: Rows,
+    file: CompressedFile,
+}
+
+impl ZstdSink {
+    fn create(file: CompressedFile) -> Result<Self, MapError> {
+        let front = Front::plain(file.file.target(), &file.header, file.layout)?;
+        Ok(Self { plain: file.file.scratch()?, rows: Rows::new(file.layout, front), file })
+    }
+}
+
+impl NdfSink for ZstdSink {
+    fn finish(self: Box<Self>) -> Result<u64, MapError> {
+        let Self { plain, rows, file } = *self;
+        file.write(|level| rows.read(&plain, level))
+    }
+}
+
+impl LevelSink for ZstdSink {
+    type Error = MapError;
+
+    fn write_rows(&mut self, place: Place, bytes: &[u8]) -> Result<(), MapError> {
+        let written = self.rows.write(&self.plain, place, bytes);
+        written.map_err(|e| MapError::io(self.file.file.target(), e))
+    }
+}
+
+/// A file with Zstandard supercompression that is to be written.
+#[derive(Debug)]
+struct CompressedFile {
+    file: AtomicFile,
+    header: Header,
+    layout: Layout,
+    /// Level of compression, from 1 (fast) to 22.
+    zstd: i32,
+}
+
+impl CompressedFile {
+    fn create(path: &Path, header: &Header, layout: Layout, zstd: i32) -> Result<Self, MapError> {
+        Ok(Self { file: AtomicFile::create(path)?, header: header.clone(), layout, zstd })
+    }
+
+    /// Compresses what `read` gives for each level, and names the file; returns its length in bytes.
+    fn write<R: Read>(mut self, read: impl Fn(usize) -> io::Result<R>) -> Result<u64, MapError> {
+        let path = self.file.target().to_owned();
+        let io = |e| MapError::io(&path, e);
+        let scheme = Some(SupercompressionScheme::Zstandard);
+        let front = |stored: &[u64]| Front::new(&path, &self.header, self.layout, scheme, stored);
+        let sizes = level_sizes(self.layout.size);
+        let mut stored = vec![0; sizes.len()];
+        // A front is as long whatever it says; what the levels take is known after them.
+        let start = front(&stored)?.bytes.len() as u64;
+        let mut file: &File = self.file.file();
+        file.seek(SeekFrom::Start(start)).map_err(io)?;
+        for (level, size) in sizes.iter().enumerate().rev() {
+            let bytes = read(level).map_err(io)?;
+            stored[level] = deflate(bytes, level_bytes(&self.layout, *size), self.zstd, file).map_err(io)?;
+        }
+        let front = front(&stored)?;
+        write_at(file, 0, &front.bytes).map_err(io)?;
+        self.file.finish()?;
+        Ok(front.length)
+    }
+}
+
+/// Writes a level of so many bytes where `file` stands, as one Zstandard frame; returns the frame's length.
+///
+/// The specification allows several frames ("Scheme Notes"), but some readers ask the first for the length of
+/// all. At every level of compression the bytes are the same for any number of threads, and however they are
+/// read: the library cuts its jobs and blocks by size. What is in memory is jobs, a few more than threads, of
+/// 8 MiB each at level 3.
+fn deflate(mut level: impl Read, length: u64, zstd: i32, mut file: &File) -> io::Result<u64> {
+    let start = file.stream_position()?;
+    let mut encoder = zstd::Encoder::new(file, zstd)?;
+    encoder.multithread(rayon::current_num_threads().max(1) as u32)?;
+    encoder.set_pledged_src_size(Some(length))?;
+    io::copy(&mut level, &mut encoder)?;
+    encoder.finish()?;
+    Ok(file.stream_position()? - start)
 }
 
 /// Reads a baked map; `None` where the file lacks our key.
