@@ -10,7 +10,7 @@ use ndfmap_maps::model::{ModelOptions, model_of_bytes};
 fuzz_target!(|bytes: &[u8]| {
     let Some((first, bytes)) = bytes.split_first() else { return };
     let name = ["map.obj", "map.fbx", "map.ply", "map.gltf", "map.glb"][usize::from(first % 5)];
-    let options = ModelOptions { staging: SceneOptions::default() };
+    let options = ModelOptions { staging: SceneOptions::default(), material: None };
     if let Ok((scene, _)) = model_of_bytes(Path::new(name), bytes, &options) {
         for object in &scene.objects {
             assert!(object.mesh.vertices.iter().all(|v| v.position.is_finite() && v.normal.is_finite()));

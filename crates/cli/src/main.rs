@@ -1,9 +1,12 @@
 //! The `ndfmap` program: reads the command line, runs one command, turns its outcome into an exit status.
 
 mod commands;
+#[cfg(feature = "gpu")]
+mod hushed;
 mod interrupt;
 mod tables;
 mod terminal;
+mod voice;
 
 use std::process::ExitCode;
 
@@ -18,7 +21,13 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 fn main() -> ExitCode {
     interrupt::clean_up_when_interrupted();
-    match Program::parse().run() {
+    let program = Program::try_parse().unwrap_or_else(|error| {
+        if let Some(hint) = commands::equals_hint(std::env::args().skip(1)) {
+            eprintln!("ndfmap: {hint}");
+        }
+        error.exit()
+    });
+    match program.run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("ndfmap: {}", said(&error));

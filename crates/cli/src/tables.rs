@@ -1,5 +1,8 @@
 //! Tables for a terminal: the library's reports as text.
 
+use std::path::Path;
+
+use ndfmap::BakeReport;
 use ndfmap::choose::Choice;
 use ndfmap::compare::{Comparison, three_digits};
 use ndfmap::core::measure::FilteringError;
@@ -48,8 +51,9 @@ pub(crate) fn comparison(comparison: &Comparison) -> String {
 /// Table of a rendering: a row a method, and a line a truth.
 pub(crate) fn rendering(report: &RenderReport) -> String {
     let name = report.methods.iter().map(String::len).max().unwrap_or(0).max("method".len());
-    let mut text =
-        format!("{:name$}  frame ms  color_error  relative_l2  brightness    FLIP  sparkle\n", "method");
+    let measured = report.methods().any(|(_, said)| said.error.is_some());
+    let columns = if measured { "  color_error  relative_l2  brightness    FLIP  sparkle" } else { "" };
+    let mut text = format!("{:name$}  frame ms{columns}\n", "method");
     for (method, said) in report.methods() {
         text += &format!("{method:name$} {:>9.1}", said.frame_ms.median);
         if let Some(e) = said.error {
@@ -75,6 +79,29 @@ pub(crate) fn rendering(report: &RenderReport) -> String {
     text
 }
 
+/// Line about a baked map.
+pub(crate) fn bake(output: &Path, report: &BakeReport) -> String {
+    let BakeReport { method, width, height, levels, layers, bytes, video_bytes, .. } = report;
+    let plural = |count: &usize, one: &str| format!("{count} {one}{}", if *count == 1 { "" } else { "s" });
+    format!(
+        "{}: {width} × {height}, {}, {} of {method}, {} on disk, {} in video memory",
+        output.display(),
+        plural(levels, "level"),
+        plural(layers, "layer"),
+        binary_bytes(*bytes),
+        binary_bytes(*video_bytes)
+    )
+}
+
+/// Bytes in the unit that people read them in.
+fn binary_bytes(bytes: u64) -> String {
+    match bytes {
+        0..1024 => format!("{bytes} bytes"),
+        1024..1_048_576 => format!("{:.1} KiB", bytes as f64 / 1024.0),
+        _ => format!("{:.1} MiB", bytes as f64 / 1_048_576.0),
+    }
+}
+
 /// Table of a choice: a row a candidate, and the reason.
 pub(crate) fn choice(choice: &Choice) -> String {
     let levels = choice.levels.iter().map(usize::to_string).collect::<Vec<_>>().join(" and ");
@@ -84,5 +111,5 @@ pub(crate) fn choice(choice: &Choice) -> String {
         let error = three_digits(c.error);
         text += &format!("  {:10} {:>4} bytes a texel {error:>7}{mark}\n", c.method, c.bytes);
     }
-    text + &format!("ndfmap: chose `{}`: {}", choice.method, choice.why)
+    text + &format!("chose `{}`: {}", choice.method, choice.why)
 }

@@ -28,7 +28,7 @@ fn bake_then_inspect_every_method() {
         for extension in ["ktx2", "exr"] {
             let file = text(&folder.path().join(format!("map.{extension}")));
             let baked =
-                json(&["bake", "builtin:armour", "--size", "48x20", "-m", method, "-o", &file, "--json"]);
+                json(&["bake", "builtin:armour", "--map-size", "48x20", "-m", method, "-o", &file, "--json"]);
             for name in [
                 "method", "width", "height", "levels", "layers", "format", "bytes", "threads", "seconds",
                 "warnings",
@@ -57,7 +57,7 @@ fn lobes_are_described_in_full() {
     let folder = tempfile::tempdir().unwrap();
     let file = text(&folder.path().join("map.ktx2"));
     let texel = |method: &str| {
-        json(&["bake", "builtin:foil", "--size", "64", "-m", method, "-o", &file, "--json"]);
+        json(&["bake", "builtin:foil", "--map-size", "64", "-m", method, "-o", &file, "--json"]);
         json(&["inspect", &file, "--json", "--texel", "4", "1", "2"])
     };
     for (method, mean, width) in [("vmf:4", 3, "kappa"), ("gmm:4", 2, "variance")] {
@@ -165,16 +165,18 @@ fn zstandard_makes_the_same_map_smaller() {
     let folder = tempfile::tempdir().unwrap();
     let [plain, small] = ["plain.ktx2", "small.ktx2"].map(|n| text(&folder.path().join(n)));
     let bake = |file: &str, more: &[&str]| {
-        let words = ["bake", "builtin:dunes", "--size", "96x33", "-m", "vmf:3", "-o", file, "--json"];
+        let words = ["bake", "builtin:dunes", "--map-size", "96x33", "-m", "vmf:3", "-o", file, "--json"];
         json(&[&words[..], more].concat())["bytes"].as_u64().unwrap()
     };
-    let (long, short) = (bake(&plain, &[]), bake(&small, &["--zstd", "9"]));
+    let (long, short) = (bake(&plain, &["--zstd=0"]), bake(&small, &["--zstd=9"]));
     assert!(short < long, "{short} {long}");
     assert_eq!(short, std::fs::metadata(&small).unwrap().len());
     for level in ["0", "3"] {
         let texel = |file: &str| json(&["inspect", file, "--json", "--texel", level, "2", "1"]);
-        assert_eq!(texel(&plain), texel(&small));
+        assert_eq!(texel(&plain)["lobes"], texel(&small)["lobes"]);
     }
+    // Unless told otherwise, maps are compressed.
+    assert!(bake(&small, &[]) < long);
     let bytes = |threads: &str| {
         bake(&small, &["--zstd", "--threads", threads]);
         std::fs::read(&small).unwrap()
@@ -186,7 +188,7 @@ fn zstandard_makes_the_same_map_smaller() {
 fn auto_chooses_by_measuring_and_says_why() {
     let folder = tempfile::tempdir().unwrap();
     let file = text(&folder.path().join("map.ktx2"));
-    let base = ["bake", "builtin:foil", "--size", "64", "-m", "auto", "-o", &file];
+    let base = ["bake", "builtin:foil", "--map-size", "64", "-m", "auto", "-o", &file];
     let chosen = json(&[&base[..], &["--bytes-per-texel", "24", "--json"]].concat());
     assert!(chosen["layers"].as_u64().unwrap() <= 3);
     let candidates = chosen["auto"]["candidates"].as_array().unwrap();
@@ -198,8 +200,13 @@ fn auto_chooses_by_measuring_and_says_why() {
     assert_eq!(json(&["inspect", &file, "--json"])["method"], chosen["method"]);
     let (status, _, said) = outcome(&[&base[..], &["--max-error", "1e-9"]].concat());
     assert!(status == 1 && said.contains("no method's error is at most"), "{said}");
+    // What was measured is not lost.
+    assert!(said.contains("toksvig ") && said.contains("bytes a texel"), "{said}");
     let (status, _, said) = outcome(&[&base[..], &["--bytes-per-texel", "4"]].concat());
-    assert!(status == 1 && said.contains("no method takes at most 4 bytes"), "{said}");
+    assert!(
+        status == 2 && said.contains("no method takes at most 4 bytes a texel; the least is 8"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -209,9 +216,9 @@ fn compare_prints_one_document_and_a_report_stands_alone() {
     let compared = json(&[
         "compare",
         "builtin:foil",
-        "--size",
+        "--map-size",
         "64",
-        "--methods",
+        "--method",
         "naive,toksvig,slopes",
         "--json",
         "--report",
@@ -240,7 +247,7 @@ fn compare_prints_one_document_and_a_report_stands_alone() {
         assert!(reader.info().width > 300 && reader.info().height > 200);
     }
     let (_, _, said) =
-        outcome(&["compare", "builtin:foil", "--size", "16", "--methods", "naive", "--report", &report]);
+        outcome(&["compare", "builtin:foil", "--map-size", "16", "--method", "naive", "--report", &report]);
     assert!(said.contains("replacing"), "{said}");
 }
 
@@ -249,7 +256,7 @@ fn filtering_is_measured_and_drawn() {
     let folder = tempfile::tempdir().unwrap();
     let report = text(&folder.path().join("report"));
     let words =
-        ["compare", "builtin:foil", "--size", "64", "--methods", "toksvig,vmf:4,vmf:4:unaligned,phong:2"];
+        ["compare", "builtin:foil", "--map-size", "64", "--method", "toksvig,vmf:4,vmf:4:unaligned,phong:2"];
     let told = json(&[&words[..], &["--filtering", "--report", &report, "--json"]].concat());
     let at = |method: &str, key: &str| told["methods"][method]["filtering"][2][key].as_f64().unwrap();
     // Level 0 is the map itself, and one texel has nothing between.
@@ -286,7 +293,7 @@ fn the_same_file_for_any_number_of_threads() {
         json(&[
             "bake",
             "builtin:foil",
-            "--size",
+            "--map-size",
             "211x130",
             "-m",
             method,
@@ -312,13 +319,13 @@ fn odd_shapes_bake() {
     let folder = tempfile::tempdir().unwrap();
     for size in ["1", "1x4096", "4096x1", "3x5", "745"] {
         let file = text(&folder.path().join("map.ktx2"));
-        json(&["bake", "builtin:ripples", "--size", size, "-o", &file, "--json"]);
+        json(&["bake", "builtin:ripples", "--map-size", size, "-o", &file, "--json"]);
         let told = json(&["inspect", &file, "--json"]);
         let last = told["levels"].as_array().unwrap().last().unwrap().clone();
         assert_eq!(last, serde_json::json!({ "width": 1, "height": 1 }));
     }
     let compared =
-        json(&["compare", "builtin:foil", "--size", "1x37", "--methods", "slopes,naive", "--json"]);
+        json(&["compare", "builtin:foil", "--map-size", "1x37", "--method", "slopes,naive", "--json"]);
     assert!(compared["methods"]["slopes"]["levels"][5]["error"].as_f64().unwrap().is_finite());
 }
 
@@ -335,7 +342,7 @@ fn wrong_usage_is_2_and_suggests() {
         (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--methd", "naive"], "--method"),
         (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--height-scale", "-1"], "above 0"),
         (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--wrap", "mirror"], "neither `repeat` nor `clamp`"),
-        (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--size", "0"], "no side from 1"),
+        (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--map-size", "0"], "no side from 1"),
         (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--threads", "0"], "threads"),
         (vec!["bake", "builtin:foil", "-o", "a.ktx2", "-m", "vmf:9"], "whole number from 1 to 8"),
         (
@@ -345,7 +352,7 @@ fn wrong_usage_is_2_and_suggests() {
         (vec!["bake", "builtin:foil", "-o", "a.ktx2", "-m", "phong"], "number of peaks"),
         (vec!["bake", "builtin:foil", "-o", "a.ktx2", "-m", "auto"], "needs `--max-error E`"),
         (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--max-error", "0.1"], "are for `--method auto`"),
-        (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--zstd", "23"], "--zstd"),
+        (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--zstd=23"], "--zstd"),
         (vec!["bake", "builtin:foil", "-o", "a.exr", "--zstd"], "is for KTX2"),
         (
             vec!["bake", "builtin:foil", "-o", "a.ktx2", "-m", "vmf:2", "--attribute", "srgb:"],
@@ -354,6 +361,20 @@ fn wrong_usage_is_2_and_suggests() {
         (vec!["compare", "builtin:foil", "--brdf", "gxx:0.2"], "did you mean `ggx`"),
         (vec!["compare", "builtin:foil", "--brdf", "ggx:7"], "between 0.0001 and 1"),
         (vec!["inspect", "builtin:foil", "--texel", "0", "0", "0"], "no baked map"),
+        (vec!["bake", "builtin:foil", "-o", "a.ktx2", "--brdf", "ggx:0.2"], "is for `--method auto`"),
+        (vec!["bake", "builtin:foil"], "as in `ndfmap bake builtin:foil foil.ktx2`"),
+        (vec!["bake", "builtin:foil", "builtin:armour"], "need `--output-dir DIR`"),
+        (vec!["bake", "tests", "-o", "a.ktx2"], "name `--output-dir DIR`"),
+        (vec!["bake", "builtin:foil", "-o", "tests"], "is a folder"),
+        (vec!["bake", "builtin:foil", "a/foil.png", "--output-dir", "b"], "written twice"),
+        (vec!["compare", "builtin:foil", "--report", "Cargo.toml"], "is a file, not a folder"),
+        (vec!["compare", "builtin:foil", "--brdf", "ggx"], "ALPHA must follow, as in `ggx:0.1`"),
+        (vec!["render", "--scene", "plane", "--truth", "64", "-o", "a.png"], "write `--truth=64`"),
+        (vec!["render", "--scene", "plane", "-o", "a.png", "--compare", "a.png"], "named for two outputs"),
+        (vec!["render", "--scene", "src", "-o", "a.png"], "is a folder: name the model in it"),
+        (vec!["render", "--scene", "house.blend", "-o", "a.png"], "Export > glTF 2.0"),
+        (vec!["render", "--scene", "dragon.ply.gz", "-o", "a.png"], "unpack it first"),
+        (vec!["render", "--scene", "plane", "-o", "a.png", "--material", "x"], "models have"),
         (vec!["bkae"], "bake"),
         (vec![], "Usage"),
     ] {
@@ -368,7 +389,7 @@ fn wrong_usage_is_2_and_suggests() {
 fn failures_are_1_and_leave_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let good = text(&folder.path().join("good.ktx2"));
-    json(&["bake", "builtin:foil", "--size", "8", "-o", &good, "--json"]);
+    json(&["bake", "builtin:foil", "--map-size", "8", "-o", &good, "--json"]);
     let cut = folder.path().join("cut.ktx2");
     let bytes = std::fs::read(&good).unwrap();
     std::fs::write(&cut, &bytes[..bytes.len() / 2]).unwrap();
@@ -378,13 +399,10 @@ fn failures_are_1_and_leave_nothing() {
     for (words, why) in [
         (vec!["bake", "builtin:nothing", "-o", &path("x.ktx2")], "there is no built-in surface `nothing`"),
         (vec!["bake", &path("none.png"), "-o", &path("x.ktx2")], "none.png"),
-        (vec!["bake", &text(folder.path()), "-o", &path("x.ktx2")], "is a folder, not a file"),
         (vec!["bake", &good, "-o", &path("x.ktx2")], "is already a baked map"),
-        (vec!["bake", "builtin:foil", "-o", &path("folder.ktx2")], "is a folder, not a file"),
         (vec!["bake", "builtin:foil", "-o", &path("no/such/x.ktx2")], "x.ktx2"),
         (vec!["bake", "builtin:foil", "-o", "/dev/null/x.exr"], "x.exr"),
         (vec!["inspect", &text(&cut)], "is truncated"),
-        (vec!["compare", "builtin:foil", "--report", &good], "good.ktx2"),
     ] {
         let (status, stdout, stderr) = outcome(&words);
         assert_eq!(status, 1, "{words:?} {stderr}");
@@ -429,7 +447,7 @@ fn end_a_bake(signal: &str, more: &[&str]) -> (Option<i32>, usize) {
     let folder = tempfile::tempdir().unwrap();
     // Factors by integration take long enough to be caught in the act.
     let mut child = Command::new(env!("CARGO_BIN_EXE_ndfmap"))
-        .args(["bake", "builtin:foil", "--size", "4096", "-m", "ndm:gaussian:integrated"])
+        .args(["bake", "builtin:foil", "--map-size", "4096", "-m", "ndm:gaussian:integrated"])
         .args(more)
         .arg("-o")
         .arg(folder.path().join("big.ktx2"))
@@ -480,8 +498,7 @@ fn render_writes_pictures_and_tells_scripts() {
         "vmf:2,naive",
         "-o",
         &png,
-        "--truth",
-        "64",
+        "--truth=64",
         "--truth-output",
         &truth,
         "--compare",
@@ -547,8 +564,7 @@ fn render_gives_the_same_bytes_for_any_number_of_threads() {
             "gmm:3",
             "-o",
             &a,
-            "--truth",
-            "32",
+            "--truth=32",
             "--truth-output",
             &b,
             "--threads",
@@ -603,15 +619,14 @@ fn compare_measures_pictures_too() {
     let told = json(&[
         "compare",
         "builtin:foil",
-        "--size",
+        "--map-size",
         "32",
-        "--methods",
+        "--method",
         "naive,vmf:2",
         "--scene",
         "plane",
-        "--truth",
-        "32",
-        "--picture",
+        "--truth=32",
+        "--size",
         "24",
         "--report",
         &report,
@@ -634,7 +649,7 @@ fn compare_measures_pictures_too() {
 #[test]
 fn heights_displace_scenes() {
     let words = ["render", "--scene", "noise-sphere", "--displace", "--device", "cpu", "--json"];
-    let small = ["--size", "24", "--map-size", "32", "--truth", "32", "-m", "slopes,slopes:9"];
+    let small = ["--size", "24", "--map-size", "32", "--truth=32", "-m", "slopes,slopes:9"];
     let told = json(&[&words[..], &small].concat());
     assert_eq!(told["method"], "slopes");
     for method in ["slopes", "slopes:9"] {
@@ -646,19 +661,17 @@ fn heights_displace_scenes() {
     let compared = json(&[
         "compare",
         "builtin:noise",
-        "--size",
+        "--map-size",
         "32",
-        "--methods",
+        "--method",
         "slopes,toksvig",
         "--scene",
         "sphere",
-        "--displace",
-        "0.5",
+        "--displace=0.5",
         "--shadows",
-        "--picture",
+        "--size",
         "24",
-        "--truth",
-        "32",
+        "--truth=32",
         "--json",
     ]);
     assert!(
@@ -674,8 +687,8 @@ fn what_cannot_be_displaced_says_why() {
             &["render", "--scene", "v-groove", "--displace", "--json"][..],
             "none of the scene's maps has heights",
         ),
-        (&["render", "--scene", "armour", "--displace", "0", "--json"], "not 0"),
-        (&["render", "--scene", "armour", "--displace", "nan", "--json"], "not 0"),
+        (&["render", "--scene", "armour", "--displace=0", "--json"], "not 0"),
+        (&["render", "--scene", "armour", "--displace=nan", "--json"], "not 0"),
         (&["render", "--scene", "armour", "--shadows", "--json"], "--displace"),
         (&["render", "--scene", "armour", "--displace", "--model", "tan", "--json"], "--model"),
         (&["bake", "builtin:armour", "-m", "slopes:1", "-o", "x.ktx2"], "5 to 128"),
@@ -684,4 +697,108 @@ fn what_cannot_be_displaced_says_why() {
         assert_eq!(status, 2, "{words:?}: {stderr}");
         assert!(stderr.contains(wanted), "{words:?}: {stderr}");
     }
+}
+
+#[test]
+fn several_maps_are_baked_and_one_that_fails_stops_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let maps = folder.path().join("maps");
+    std::fs::create_dir(&maps).unwrap();
+    let save = |name: &str, pixels: &[u8]| {
+        let mut encoder = png::Encoder::new(std::fs::File::create(maps.join(name)).unwrap(), 2, 2);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.write_header().unwrap().write_image_data(pixels).unwrap();
+    };
+    save("flat.png", &[128, 128, 255].repeat(4));
+    save("red.png", &[200, 10, 10, 220, 30, 5, 190, 5, 40, 100, 0, 0]);
+    std::fs::write(maps.join("notes.txt"), "no picture").unwrap();
+    let out = folder.path().join("out");
+    let words =
+        ["bake", &text(&maps), "builtin:foil", "--map-size", "8", "--output-dir", &text(&out), "--json"];
+    let (status, stdout, stderr) = outcome(&words);
+    assert!(status == 1 && stderr.contains("1 of 3 maps could not be baked"), "{stderr}");
+    let told: Value = serde_json::from_str(&stdout).unwrap();
+    assert_eq!(told["ndfmap"]["arguments"][0], "bake");
+    let rows = told["maps"].as_array().unwrap();
+    assert_eq!(rows.iter().map(|row| row["error"].is_null()).collect::<Vec<_>>(), [true, false, true]);
+    assert!(rows[1]["error"].as_str().unwrap().contains("looks like colours"), "{}", rows[1]);
+    for name in ["flat", "foil"] {
+        assert_eq!(
+            json(&["inspect", &text(&out.join(name).with_extension("ktx2")), "--json"])["method"],
+            "slopes"
+        );
+    }
+}
+
+#[test]
+fn maps_come_from_stdin_and_go_to_stdout() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = text(&folder.path().join("a.ktx2"));
+    json(&["bake", "builtin:foil", "--map-size", "16", &file, "--json"]);
+    let piped = std::process::Command::new(env!("CARGO_BIN_EXE_ndfmap"))
+        .args(["bake", "builtin:foil", "--map-size", "16", "-"])
+        .output()
+        .unwrap();
+    assert!(piped.status.success());
+    assert_eq!(piped.stdout, std::fs::read(&file).unwrap());
+    let mut picture = Vec::new();
+    let mut encoder = png::Encoder::new(&mut picture, 1, 1);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.write_header().unwrap().write_image_data(&[128, 128, 255]).unwrap();
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_ndfmap"))
+        .args(["bake", "-", &file, "--quiet"])
+        .stdin(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    std::io::Write::write_all(&mut child.stdin.take().unwrap(), &picture).unwrap();
+    let done = child.wait_with_output().unwrap();
+    assert!(done.status.success() && done.stderr.is_empty(), "{}", String::from_utf8_lossy(&done.stderr));
+    assert_eq!(json(&["inspect", &file, "--json"])["width"], 1);
+}
+
+#[test]
+fn files_are_kept_where_that_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = text(&folder.path().join("a.ktx2"));
+    json(&["bake", "builtin:foil", "--map-size", "8", &file, "--json"]);
+    let before = std::fs::read(&file).unwrap();
+    let (status, _, said) = outcome(&["bake", "builtin:foil", "--map-size", "4", &file, "--no-clobber"]);
+    assert!(status == 1 && said.contains("`--no-clobber` keeps it"), "{said}");
+    assert_eq!(std::fs::read(&file).unwrap(), before);
+}
+
+#[test]
+fn shells_and_manuals_know_every_command() {
+    let (status, script, _) = outcome(&["completions", "bash"]);
+    assert!(status == 0 && script.contains("--output-dir"), "{script}");
+    let folder = tempfile::tempdir().unwrap();
+    let (status, _, said) = outcome(&["man", "-o", &text(folder.path())]);
+    assert_eq!(status, 0, "{said}");
+    for command in ["bake", "compare", "demo", "inspect", "render"] {
+        let page = std::fs::read_to_string(folder.path().join(format!("ndfmap-{command}.1"))).unwrap();
+        assert!(page.contains(".SH OPTIONS"), "{command}");
+    }
+}
+
+#[test]
+fn nothing_in_view_is_no_perfect_picture() {
+    let words = [
+        "render",
+        "--scene",
+        "plane",
+        "--camera",
+        "0,0,4,0,9,99",
+        "--truth=16",
+        "--size",
+        "8",
+        "--map-size",
+        "8",
+        "--device",
+        "cpu",
+        "--json",
+    ];
+    let (status, _, said) = outcome(&words);
+    assert!(status == 2 && said.contains("nothing is in view"), "{said}");
 }

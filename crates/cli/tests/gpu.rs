@@ -131,7 +131,7 @@ fn without_an_adapter_it_says_so_and_auto_takes_the_processor() {
 #[test]
 fn what_only_a_gpu_can_do_is_not_asked_of_the_processor() {
     let folder = tempfile::tempdir().unwrap();
-    let output = ndfmap(folder.path(), "render --scene foil --size 8 --device cpu --sampler 4 --json");
+    let output = ndfmap(folder.path(), "render --scene foil --size 8 --device cpu --sampler=4 --json");
     assert_eq!(output.status.code(), Some(2));
     assert!(said(&output).contains("name it with `--device gpu`"), "{}", said(&output));
 }

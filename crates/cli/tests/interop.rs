@@ -92,7 +92,7 @@ fn ktx2_files_open_in_an_independent_reader() {
         let baked = json(&[
             "bake",
             "builtin:foil",
-            "--size",
+            "--map-size",
             "50x33",
             "-m",
             method,

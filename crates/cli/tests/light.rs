@@ -7,7 +7,7 @@ mod common;
 use common::{json, outcome, text};
 use serde_json::Value;
 
-const COMPARED: [&str; 7] = ["compare", "builtin:foil", "--size", "32", "--methods", "vmf:2", "--json"];
+const COMPARED: [&str; 7] = ["compare", "builtin:foil", "--map-size", "32", "--method", "vmf:2", "--json"];
 
 #[test]
 fn environments_light_scenes_and_turn() {
@@ -15,9 +15,8 @@ fn environments_light_scenes_and_turn() {
     let picture = |name: &str| text(&folder.path().join(name));
     let words =
         ["render", "--scene", "sphere", "--map-size", "32", "--size", "24", "--device", "cpu", "--json"];
-    let told = json(
-        &[&words[..], &["--environment", "builtin:sky", "--truth", "64", "-m", "vmf:2,slopes"]].concat(),
-    );
+    let told =
+        json(&[&words[..], &["--environment", "builtin:sky", "--truth=64", "-m", "vmf:2,slopes"]].concat());
     assert_eq!(told["environment"]["file"], "builtin:sky");
     assert_eq!(told["environment"]["technique"], "prefiltered");
     assert_eq!(told["environment"]["suns"], 1);
@@ -67,8 +66,7 @@ fn environments_light_scenes_and_turn() {
             "{how}"
         );
     }
-    let pictures =
-        ["--scene", "sphere", "--environment", "builtin:white", "--picture", "16", "--truth", "32"];
+    let pictures = ["--scene", "sphere", "--environment", "builtin:white", "--size", "16", "--truth=32"];
     let compared = json(&[&COMPARED[..], &pictures].concat());
     assert_eq!(compared["environment"]["file"], "builtin:white");
     // Thirty-two rays have a noise of 0.044.
@@ -89,8 +87,7 @@ fn measured_lobes_bring_their_colours() {
         "--device",
         "cpu",
         "--json",
-        "--truth",
-        "64",
+        "--truth=64",
     ];
     let (status, out, err) =
         outcome(&[&words[..], &["--brdf", "sgd:gold-metallic-paint", "-m", "vmf:2,sh:7"]].concat());
@@ -129,7 +126,7 @@ fn light_and_lobes_used_wrongly_say_why() {
         ["render", "--scene", "sphere", "--size", "4", "--map-size", "4", "--device", "cpu", "--json"];
     for (words, status, wanted) in [
         (&["--brdf", "sgd:blue-fabrik"][..], 2, "blue-fabric"),
-        (&["--brdf", "sgd:"], 2, "there is no such material"),
+        (&["--brdf", "sgd:"], 2, "NAME must follow, as in `sgd:blue-fabric`"),
         (&["--brdf", "merl"], 2, "as in `merl:FILE`"),
         (&["--brdf", "merl:nowhere.binary"], 1, "nowhere.binary"),
         (&["--brdf", &merl], 1, "has 12 bytes; a MERL table has 34992012"),

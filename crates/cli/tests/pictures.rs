@@ -11,7 +11,7 @@ use serde_json::Value;
 /// Colour errors of methods in one picture of 500 × 500.
 fn colour_errors(scene: &str, time: &str, methods: &str) -> Value {
     let told =
-        json(&["render", "--scene", scene, "--time", time, "--method", methods, "--truth", "128", "--json"]);
+        json(&["render", "--scene", scene, "--time", time, "--method", methods, "--truth=128", "--json"]);
     eprintln!("{scene} at {time}: noise {}, {}", told["truth"]["noise"], told["methods"]);
     told["methods"].clone()
 }
@@ -70,8 +70,7 @@ fn lobes_do_not_sparkle_on_real_maps() {
             "128",
             "--method",
             "vmf:4,toksvig,naive",
-            "--truth",
-            "512",
+            "--truth=512",
             "--sparkle",
             "--json",
         ]);

@@ -12,7 +12,7 @@ use ndfmap_scene::{Object, Scene, SceneOptions};
 
 fn read(name: &str) -> Result<(Scene, Vec<String>), MapError> {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name);
-    read_model(&path, &ModelOptions { staging: SceneOptions::default() })
+    read_model(&path, &ModelOptions { staging: SceneOptions::default(), material: None })
 }
 
 /// The object under a place of the square from -1 to 1, its map coordinates and its normal there.

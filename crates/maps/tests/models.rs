@@ -12,7 +12,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 fn options() -> ModelOptions {
-    ModelOptions { staging: SceneOptions::default() }
+    ModelOptions { staging: SceneOptions::default(), material: None }
 }
 
 fn read(name: &str, bytes: &[u8]) -> Result<(Scene, Vec<String>), MapError> {
@@ -243,7 +243,8 @@ fn a_map_of_ones_own_leaves_the_mean_colour() {
     let map = ndfmap_core::procedural::find("foil").unwrap().build;
     let map = map(ndfmap_core::grid::Size::new(4, 4).unwrap());
     let staging = SceneOptions { map: Some(MaterialMap::Surface(map.into())), ..SceneOptions::default() };
-    let (scene, warnings) = model_of_bytes(Path::new("a.gltf"), &gltf(), &ModelOptions { staging }).unwrap();
+    let (scene, warnings) =
+        model_of_bytes(Path::new("a.gltf"), &gltf(), &ModelOptions { staging, material: None }).unwrap();
     assert!(warnings[0].contains("left out"), "{warnings:?}");
     let params = scene.materials[0].params;
     // Half red, half blue, of metalness 0.25.

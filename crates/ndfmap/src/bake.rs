@@ -46,6 +46,8 @@ pub struct BakeReport {
     pub format: String,
     /// Length of the file in bytes.
     pub bytes: u64,
+    /// Bytes of all levels in video memory, where they lie as they are.
+    pub video_bytes: u64,
     /// Threads that were at work.
     pub threads: usize,
     /// Times of the parts of the work.
@@ -202,15 +204,19 @@ impl<'a> BakeJob<'a> {
             }
         };
         let size = self.map.surface.size();
+        let layers = self.method.layers_with(self.attributes.len());
+        let sizes = level_sizes(size);
+        let texels: usize = sizes.iter().map(|size| size.area()).sum();
         let suffix = if bumpslopes { "-bumpslopes" } else { "" };
         Ok(BakeReport {
             method: self.method.to_string(),
             width: size.width,
             height: size.height,
-            levels: level_sizes(size).len(),
-            layers: self.method.layers_with(self.attributes.len()),
+            levels: sizes.len(),
+            layers,
             format: format!("{}{suffix}", format.extensions[0]),
             bytes,
+            video_bytes: (texels * layers * self.precision.texel_bytes()) as u64,
             threads: rayon::current_num_threads(),
             seconds: BakeSeconds { read: 0.0, bake: baked, write: start.elapsed().as_secs_f64() - baked },
             warnings: self.map.warnings.clone(),

@@ -92,6 +92,23 @@ impl Auto<'_> {
     /// [`Error::Failed`] where no candidate is within the limit, [`Error::Request`] for a map of one texel,
     /// and [`Error::Cancelled`].
     pub fn choose(&self, limit: Limit, observer: &dyn Observer) -> Result<Choice, Error> {
+        // Known before anything is measured.
+        let bytes_of = |method: &AnyMethod| method.layers() * self.precision.texel_bytes();
+        let mut methods = Vec::new();
+        for spelling in CANDIDATES {
+            let method = spelling.parse::<AnyMethod>()?;
+            if !self.lobes_only || method.carries_attributes() {
+                methods.push(method);
+            }
+        }
+        let fewest = methods.iter().map(bytes_of).min().unwrap_or_default();
+        if let Limit::Bytes(most) = limit {
+            methods.retain(|method| bytes_of(method) <= most);
+            if methods.is_empty() {
+                let reason = format!("no method takes at most {most} bytes a texel; the least is {fewest}");
+                return Err(Error::Request(reason));
+            }
+        }
         let sizes = level_sizes(self.surface.size());
         let last = sizes.iter().rposition(|s| s.area() > 1).ok_or_else(|| {
             Error::Request("a map of one texel has nothing to measure: name a method".to_owned())
@@ -105,20 +122,14 @@ impl Auto<'_> {
             true_corners(&truth, self.surface.wraps(), &levels, observer)?
         };
         let mut candidates = Vec::new();
-        for spelling in CANDIDATES {
-            let method = spelling.parse::<AnyMethod>()?;
-            let bytes = method.layers() * self.precision.texel_bytes();
-            if self.lobes_only && !method.carries_attributes()
-                || matches!(limit, Limit::Bytes(most) if bytes > most)
-            {
-                continue;
-            }
-            observer.begin(spelling);
+        for method in methods {
+            let bytes = bytes_of(&method);
+            observer.begin(&method.to_string());
             let bake = Bake::new(self.surface, &*method).precision(self.precision).observer(observer);
             let (pyramid, _) = bake.to_pyramid()?;
             let error = |truth| filtering_error(&pyramid, &*method, self.lobe, &lattice, truth).filtered;
             let error = corners.iter().map(error).fold(0.0, f64::max);
-            candidates.push(Candidate { method: spelling.to_owned(), bytes, error });
+            candidates.push(Candidate { method: method.to_string(), bytes, error });
         }
         candidates.sort_by(|a, b| {
             (a.bytes, a.error).partial_cmp(&(b.bytes, b.error)).unwrap_or(std::cmp::Ordering::Equal)
@@ -145,9 +156,12 @@ fn pick(candidates: &[Candidate], limit: Limit) -> Result<(usize, String), Error
             }
             let best = least
                 .map(|i| format!("; the least is {:.3}, by `{}`", candidates[i].error, candidates[i].method));
+            let row =
+                |c: &Candidate| format!("\n  {:10} {:>4} bytes a texel {:>7.3}", c.method, c.bytes, c.error);
             Err(Error::Failed(format!(
-                "no method's error is at most {most} on this map{}",
-                best.unwrap_or_default()
+                "no method's error is at most {most} on this map{}:{}",
+                best.unwrap_or_default(),
+                candidates.iter().map(row).collect::<String>()
             )))
         }
         Limit::Bytes(most) => match least {

@@ -245,6 +245,13 @@ impl<E: Engine> Shot<'_, E> {
             engine.truth(&view, &effort, observer)
         };
         let truth = job.truth.map(brute).transpose()?;
+        if let Some(truth) = &truth
+            && truth.picture.texels().iter().all(|pixel| *pixel == scene.background)
+        {
+            let reason = "nothing is in view: every pixel shows the background, of which no error can be measured \
+                          (`--camera` looks elsewhere)";
+            return Err(Error::Request(reason.to_owned()));
+        }
         let seconds = start.elapsed().as_secs_f64();
         // A drifting truth is rendered in one go, which only the CPU renderer can do.
         let drift = |effort: Effort| -> Result<DriftReport, Error> {

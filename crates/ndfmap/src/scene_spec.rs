@@ -21,6 +21,8 @@ pub struct SceneSpec {
     pub scene: String,
     /// Map of the first material.
     pub map: Option<MaterialMap>,
+    /// Name of the model's material that the map and the colours are for; `None` for that of its first mesh.
+    pub material: Option<String>,
     /// Size of built-in maps.
     pub map_size: Option<Size>,
     /// Lobe of every material.
@@ -103,9 +105,16 @@ impl SceneSpec {
         }
         let path = Path::new(&self.scene);
         let mut scene = match scene::find(&self.scene) {
-            Some(row) => (row.build)(&staging),
+            Some(row) => {
+                if let Some(name) = &self.material {
+                    let why = "a built-in scene has no names of materials; models have";
+                    return Err(Error::Request(format!("--material {name}: {why}")));
+                }
+                (row.build)(&staging)
+            }
             None => {
-                let (scene, warnings) = read_model(path, &ModelOptions { staging })?;
+                let options = ModelOptions { staging, material: self.material.clone() };
+                let (scene, warnings) = read_model(path, &options)?;
                 warnings.iter().for_each(|w| observer.note(&format!("warning: {}: {w}", path.display())));
                 scene
             }

@@ -1,5 +1,6 @@
 //! Arguments that several commands take, and their parsers.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -11,15 +12,18 @@ use ndfmap::core::ndf::{self, AnyMethod, ParseMethodError};
 use ndfmap::core::pyramid;
 use ndfmap::core::surface::{SlopeFilter, Wrap, Wraps};
 use ndfmap::inspect::{PictureReport, describe_picture};
-use ndfmap::maps::SourceKind;
 use ndfmap::maps::environment::read_environment;
 use ndfmap::maps::merl::read_merl;
 use ndfmap::maps::model::is_model;
 use ndfmap::maps::source::{
-    Convention, DEFAULT_HEIGHT_SCALE, SourceMap, SourceOptions, fit_height_scale, read_source,
+    BUILTIN_PREFIX, Convention, DEFAULT_HEIGHT_SCALE, SourceMap, SourceOptions, fit_height_scale,
+    read_source, source_of_bytes,
 };
+use ndfmap::maps::{MapError, SourceKind};
 use ndfmap::{Error, RotatingEnvironment, scene};
 use serde_json::json;
+
+use crate::voice::{detail, say, warn};
 
 /// Reading of the source map.
 #[derive(Debug, Args)]
@@ -42,7 +46,7 @@ pub(super) struct SourceArguments {
     #[arg(long)]
     invert: bool,
     /// Derivative that takes slopes from heights
-    #[arg(long, value_enum, default_value_t = FilterArgument::Central)]
+    #[arg(long, value_enum, ignore_case = true, default_value_t = FilterArgument::Central)]
     slope_filter: FilterArgument,
     /// Continuation beyond the edges: `repeat`, `clamp`, or one for each axis as in `repeat,clamp`
     #[arg(long, value_name = "X[,Y]", default_value = "repeat", value_parser = wraps)]
@@ -52,10 +56,16 @@ pub(super) struct SourceArguments {
 /// Size of built-in maps.
 #[derive(Debug, Args)]
 pub(super) struct BuiltinSize {
-    /// Size of a built-in map, as in 512 or 640x480
-    #[arg(long, value_name = "SIZE", default_value = "512", value_parser = size)]
-    pub(super) size: Size,
+    /// Size of built-in maps, as in 512 or 640x480 [default: 512]
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub(super) map_size: Option<Size>,
 }
+
+/// Name that stands for stdin and stdout.
+pub(super) const STANDARD: &str = "-";
+
+/// Size of built-in maps, unless told otherwise.
+const BUILTIN_SIZE: Size = Size { width: 512, height: 512 };
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum From {
@@ -98,22 +108,38 @@ enum FilterArgument {
 
 impl SourceArguments {
     /// Reads the map, at a height scale that fits the normal map beside it where that is asked for.
-    pub(super) fn read(&self, map: &Path, builtin_size: Size) -> Result<SourceMap, Error> {
-        let options = self.fitted(map, builtin_size)?;
-        Ok(read_source(map, &options)?)
+    pub(super) fn read(&self, map: &Path, builtin: &BuiltinSize) -> Result<SourceMap, Error> {
+        let options = self.fitted(map, builtin)?;
+        let read = match map.to_str() {
+            Some(STANDARD) => {
+                let mut bytes = Vec::new();
+                std::io::stdin().lock().read_to_end(&mut bytes).map_err(|e| MapError::io(map, e))?;
+                source_of_bytes(map, &bytes, &options)?
+            }
+            _ => read_source(map, &options)?,
+        };
+        read.warnings.iter().for_each(|warning| warn(map, warning));
+        if let Some(evidence) = read.convention {
+            detail(format_args!("{}: {evidence}", map.display()));
+        }
+        Ok(read)
     }
 
     /// Describes a picture.
-    pub(super) fn describe(&self, picture: &Path, builtin_size: Size) -> Result<PictureReport, Error> {
-        describe_picture(picture, &self.fitted(picture, builtin_size)?)
+    pub(super) fn describe(&self, picture: &Path, builtin: &BuiltinSize) -> Result<PictureReport, Error> {
+        describe_picture(picture, &self.fitted(picture, builtin)?)
     }
 
     /// Options in the library's form, for a map and for built-in maps of this size.
-    fn fitted(&self, map: &Path, builtin_size: Size) -> Result<SourceOptions, Error> {
-        let options = self.options(builtin_size);
+    fn fitted(&self, map: &Path, builtin: &BuiltinSize) -> Result<SourceOptions, Error> {
+        let options = self.options(builtin.map_size.unwrap_or(BUILTIN_SIZE));
+        let is_builtin = map.to_str().is_some_and(|name| name.starts_with(BUILTIN_PREFIX));
+        if builtin.map_size.is_some() && !is_builtin {
+            warn(map, "is not built in: `--map-size` does nothing");
+        }
         let Some(HeightScale::Fitted) = self.height_scale else {
             if self.normal_map.is_some() {
-                super::warn(map, "is not fitted to `--normal-map`, as `--height-scale auto` is not there");
+                warn(map, "is not fitted to `--normal-map`, as `--height-scale auto` is not there");
             }
             return Ok(options);
         };
@@ -124,12 +150,10 @@ impl SourceArguments {
         let fit = fit_height_scale(map, normals, &options)?;
         let (scale, correlation) = (fit.scale, fit.correlation);
         let deep = if fit.invert { ", white deep" } else { "" };
-        super::say(
-            map,
-            &format!(
-                "height scale {scale:.4}{deep} fits the normal map (slopes correlate by {correlation:.2})"
-            ),
-        );
+        say(format_args!(
+            "{}: height scale {scale:.4}{deep} fits the normal map (slopes correlate by {correlation:.2})",
+            map.display()
+        ));
         Ok(SourceOptions { height_scale: Some(scale), invert: fit.invert, ..options })
     }
 
@@ -201,16 +225,17 @@ impl EnvironmentArguments {
     pub(super) fn read(&self) -> Result<Option<RotatingEnvironment>, Error> {
         let Some(path) = &self.environment else { return Ok(None) };
         let (environment, warnings) = read_environment(path)?;
-        warnings.iter().for_each(|w| super::warn(path, w));
+        warnings.iter().for_each(|w| warn(path, w));
         let environment =
             SceneEnvironment { technique: self.environment_light, ..SceneEnvironment::new(environment) };
         let suns = &environment.filtered.suns;
         if !suns.lights.is_empty() {
             let (count, percent) = (suns.lights.len(), 100.0 * suns.share);
             let name = path.display();
-            eprintln!(
-                "ndfmap: {name}: {count} small bright source(s), {percent:.1} % of its light, shine as lights of their own"
-            );
+            let sources = if count == 1 { "source shines as a light" } else { "sources shine as lights" };
+            say(format_args!(
+                "{name}: {count} small bright {sources} of its own: {percent:.1} % of all light"
+            ));
         }
         Ok(Some(RotatingEnvironment {
             environment,
@@ -296,7 +321,7 @@ const MERL: &str = "merl:";
 
 /// Checks a BRDF's spelling; an unknown one suggests the nearest. Files are for [`read_brdf`] to check.
 pub(super) fn brdf_spelling(text: &str) -> Result<String, String> {
-    if text == "merl" || text == MERL {
+    if text.eq_ignore_ascii_case("merl") || text == MERL {
         return Err("a file must follow, as in `merl:FILE`".to_owned());
     }
     if text.starts_with(MERL) {
@@ -305,7 +330,7 @@ pub(super) fn brdf_spelling(text: &str) -> Result<String, String> {
     match text.parse::<AnyLobe>() {
         Ok(_) => Ok(text.to_owned()),
         Err(ParseLobeError::Unknown(name)) => {
-            Err(unknown(&name, brdf::TABLE.iter().map(|r| r.name).chain(["merl"])))
+            Err(unknown(&name, brdf::TABLE.iter().chain(brdf::ALIASES).map(|r| r.name).chain(["merl"])))
         }
         Err(other) => Err(other.to_string()),
     }
@@ -317,10 +342,7 @@ pub(super) fn read_brdf(spelling: &str) -> Result<AnyLobe, Error> {
         Some(file) => {
             let (lobe, missing) = read_merl(file.as_ref())?;
             if missing > 0 {
-                super::warn(
-                    file.as_ref(),
-                    &format!("{missing} values are negative or no number, and left out"),
-                );
+                warn(file.as_ref(), &format!("{missing} values are negative or no number, and left out"));
             }
             lobe.into()
         }
@@ -328,10 +350,10 @@ pub(super) fn read_brdf(spelling: &str) -> Result<AnyLobe, Error> {
     };
     if let Some(LobeFactors { residual, kernels, .. }) = lobe.measured() {
         let [factored, fitted] = [residual.factored, residual.fitted].map(|left| 100.0 * left);
-        eprintln!(
-            "ndfmap: {spelling}: kd + f(theta_h) g(theta_d) leaves {factored:.1} % of the table, and f as {} kernels {fitted:.1} %",
+        say(format_args!(
+            "{spelling}: kd + f(theta_h) g(theta_d) leaves {factored:.1} % of the table, and f as {} kernels {fitted:.1} %",
             kernels.len()
-        );
+        ));
     }
     Ok(lobe)
 }
@@ -341,9 +363,38 @@ pub(super) fn scene_name(text: &str) -> Result<String, String> {
     if scene::find(text).is_some() || is_model(text.as_ref()) {
         return Ok(text.to_owned());
     }
+    if let Some(reason) = no_scene(text.as_ref()) {
+        return Err(format!("{text}: {reason}"));
+    }
     let models: Vec<&str> = ndfmap::maps::model::TABLE.iter().flat_map(|f| f.extensions).copied().collect();
     let nearest = unknown(text, scene::TABLE.iter().map(|r| r.name));
     Err(format!("{nearest}, and models: .{}", models.join(", .")))
+}
+
+/// Reason why a file is no scene, and what to do about it; `None` for a name that is no file's.
+fn no_scene(path: &Path) -> Option<String> {
+    if path.is_dir() {
+        return Some("is a folder: name the model in it".to_owned());
+    }
+    let name = path.file_name()?.to_string_lossy().to_lowercase();
+    if name.ends_with(".gz") || name.ends_with(".zip") || name.ends_with(".7z") {
+        return Some("is packed: unpack it first".to_owned());
+    }
+    let program = match name.rsplit_once('.')?.1 {
+        "blend" => "a Blender file: in Blender, File > Export > glTF 2.0",
+        "usd" | "usda" | "usdc" | "usdz" => "a USD file: export glTF 2.0",
+        "max" => "a 3ds Max file: export glTF 2.0 or FBX",
+        "ma" | "mb" => "a Maya file: export glTF 2.0 or FBX",
+        "c4d" | "skp" | "3dm" | "step" | "stp" | "iges" => {
+            "a file of its own program: export glTF 2.0 or FBX"
+        }
+        "dae" | "3ds" | "stl" | "x3d" | "abc" | "vrm" => {
+            "of a format that is not read: convert it to glTF 2.0"
+        }
+        _ if path.exists() => "no model of a known format: convert it to glTF 2.0",
+        _ => return None,
+    };
+    Some(format!("is {program}"))
 }
 
 /// Says that a name is unknown, and which is nearest.
@@ -360,8 +411,13 @@ pub(super) fn unknown(name: &str, known: impl Iterator<Item = &'static str> + Cl
 
 /// List of every method with its parameters and summary, and of every built-in map, for `--help`.
 pub(super) fn methods_help() -> String {
-    let rows =
-        ndf::TABLE.iter().map(|r| format!("  {}{}\n      {} ({})", r.name, r.parameters, r.summary, r.paper));
+    let rows = ndf::TABLE.iter().map(|r| {
+        let also = match r.aliases {
+            [] => String::new(),
+            names => format!("; also {}", names.join(", ")),
+        };
+        format!("  {}{}\n      {} ({}){also}", r.name, r.parameters, r.summary, r.paper)
+    });
     format!(
         "Methods:\n{}\n\nBuilt-in maps (`builtin:NAME`):\n{}",
         rows.collect::<Vec<_>>().join("\n"),
@@ -376,7 +432,10 @@ fn builtin_help() -> String {
 
 /// List of every BRDF with its parameter and summary, for `--help`.
 pub(super) fn brdfs_help() -> String {
-    let rows = brdf::TABLE.iter().map(|r| format!("  {}{}\n      {}", r.name, r.parameter, r.summary));
+    let rows = brdf::TABLE
+        .iter()
+        .chain(brdf::ALIASES)
+        .map(|r| format!("  {}{}\n      {}", r.name, r.parameter, r.summary));
     let merl = "  merl:FILE\n      a file of measurements in the MERL format (.binary), factored, in its own colours".to_owned();
     format!("BRDFs:\n{}", rows.chain([merl]).collect::<Vec<_>>().join("\n"))
 }

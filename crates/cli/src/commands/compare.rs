@@ -10,8 +10,8 @@ use ndfmap::core::grid::Size;
 use ndfmap::core::lookup::Lookups;
 use ndfmap::core::ndf::AnyMethod;
 use ndfmap::core::pyramid;
+use ndfmap::maps::atomic;
 use ndfmap::maps::source::SourceMap;
-use ndfmap::maps::{MapError, atomic};
 use ndfmap::render::{Device, RenderJob, RenderReport, render};
 use ndfmap::report::{self, Pages, ReportFile};
 use ndfmap::scene::Effort;
@@ -22,7 +22,7 @@ use super::arguments::{
     method_spelling, methods_help, read_brdf, scene_name, size,
 };
 use super::render::{DisplaceArguments, FilterArguments, check_drift};
-use super::{print, print_json, say_if_replaced, to_value, warn};
+use super::{make_folder, make_way, print, print_json, say_written, to_value};
 use crate::tables;
 use crate::terminal::Terminal;
 
@@ -37,8 +37,9 @@ pub(super) struct Compare {
     /// The map: a picture file, or `builtin:NAME`
     map: PathBuf,
     /// Methods, separated by commas
-    #[arg(long, value_delimiter = ',', default_value = DEFAULT_METHODS, value_parser = method_spelling)]
-    methods: Vec<String>,
+    #[arg(short, long, visible_alias = "methods", value_delimiter = ',', default_value = DEFAULT_METHODS,
+        value_parser = method_spelling)]
+    method: Vec<String>,
     /// The reflectance lobe they are measured with
     #[arg(long, default_value = "blinn-phong:50", value_parser = brdf_spelling)]
     brdf: String,
@@ -58,9 +59,12 @@ pub(super) struct Compare {
     #[arg(long, value_name = "RAYS", default_value_t = 256, requires = "scene",
         value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     truth: u32,
-    /// Size of the pictures
+    /// Size of the pictures, as in 256 or 640x480
     #[arg(long, value_name = "SIZE", default_value = "256", value_parser = size, requires = "scene")]
-    picture: Size,
+    size: Size,
+    /// Material of a model that the map is laid on [default: that of its first mesh]
+    #[arg(long, value_name = "NAME", requires = "scene")]
+    material: Option<String>,
     /// Also measure how each method sparkles as the camera drifts by a pixel
     #[arg(long, requires = "scene")]
     sparkle: bool,
@@ -79,7 +83,7 @@ pub(super) struct Compare {
 impl Compare {
     pub(super) fn run(self, json: bool) -> Result<(), Error> {
         let mut methods: Vec<AnyMethod> = Vec::new();
-        for spelling in &self.methods {
+        for spelling in &self.method {
             let method: AnyMethod = spelling.parse()?;
             // Two spellings of one method would share a key in the JSON.
             if !methods.contains(&method) {
@@ -87,12 +91,9 @@ impl Compare {
             }
         }
         if self.sparkle {
-            check_drift(self.picture)?;
+            check_drift(self.size)?;
         }
-        let map = self.source.read(&self.map, self.builtin.size)?;
-        for warning in &map.warnings {
-            warn(&self.map, warning);
-        }
+        let map = self.source.read(&self.map, &self.builtin)?;
         let environment = self.environment.read()?;
         let brdf: AnyLobe = read_brdf(&self.brdf)?;
         let run = Run {
@@ -105,13 +106,14 @@ impl Compare {
                 scene: SceneSpec {
                     scene: scene.clone(),
                     map: Some(Arc::clone(&map.surface).into()),
+                    material: self.material.clone(),
                     lobe: Some(brdf.clone()),
                     displacement: self.displace.displacement(),
                     environment: environment.clone(),
                     ..SceneSpec::default()
                 },
                 times: vec![0.0],
-                size: self.picture,
+                size: self.size,
                 lookups: self.filter.lookups(),
                 truth: Effort { rays: self.truth as usize, noise: 0.0, seed: 0 },
                 sparkle: self.sparkle,
@@ -119,15 +121,16 @@ impl Compare {
         };
         let terminal = Terminal::default();
         let Measured { comparison, pictures, written } = run.measure(self.report.as_deref(), &terminal)?;
-        for file in written {
-            eprintln!("ndfmap: wrote {}", file.display());
-        }
+        say_written(&written);
         if !json {
             let said = |pictures: &RenderReport| format!("\npictures\n\n{}", tables::rendering(pictures));
             let pictures = pictures.as_ref().map_or_else(String::new, said);
             return print(&(tables::comparison(&comparison) + &pictures));
         }
         let mut value = to_value(&comparison)?;
+        if !written.is_empty() {
+            value["files"] = written.iter().map(|f| f.display().to_string()).collect();
+        }
         if let (Some(pictures), Some(scene)) = (pictures, self.scene) {
             value["scene"] = scene.into();
             value["truth"] = to_value(&pictures.truth())?;
@@ -174,7 +177,7 @@ impl Run<'_> {
     pub(super) fn measure(&self, folder: Option<&Path>, terminal: &Terminal) -> Result<Measured, Error> {
         // A folder that cannot be made, or a missing scene, should fail before the minutes of measuring.
         if let Some(folder) = folder {
-            std::fs::create_dir_all(folder).map_err(|e| MapError::io(folder, e))?;
+            make_folder(folder)?;
         }
         let pictures = self.pictures.as_ref().map(|pictures| self.render(pictures, terminal)).transpose()?;
         let subject = Subject {
@@ -197,7 +200,7 @@ impl Run<'_> {
             };
             for ReportFile { name, bytes } in report::draw(&pages)? {
                 let path = folder.join(name);
-                say_if_replaced(&path);
+                make_way(&path)?;
                 atomic::write(&path, &bytes)?;
                 written.push(path);
             }

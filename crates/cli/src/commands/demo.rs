@@ -17,7 +17,7 @@ use ndfmap::{BakeJob, Error, SceneSpec};
 
 use super::arguments::read_brdf;
 use super::compare::{DEFAULT_METHODS, Measured, Run};
-use super::{print, print_json, say_if_replaced, to_value};
+use super::{make_way, print, print_json, to_value};
 use crate::tables;
 use crate::terminal::Terminal;
 
@@ -79,13 +79,13 @@ impl Demo {
         let Measured { comparison, mut written, .. } = run.measure(Some(&self.output), &terminal)?;
         for (name, scene, times) in SHEETS {
             let path = self.output.join(name);
-            say_if_replaced(&path);
+            make_way(&path)?;
             atomic::write(&path, &sheet(scene, times, &terminal)?)?;
             written.push(path);
         }
 
         let path = self.output.join("foil.slopes.ktx2");
-        say_if_replaced(&path);
+        make_way(&path)?;
         BakeJob::new(&map, Slopes::new()).observer(&terminal).save(&path, &WriteOptions::default())?;
         written.push(path);
 

@@ -9,7 +9,8 @@ use ndfmap::{Error, inspect};
 use serde_json::{Map, Value};
 
 use super::arguments::{BuiltinSize, SourceArguments};
-use super::{print, print_json, to_value, warn};
+use super::{print, print_json, to_value};
+use crate::voice::warn;
 
 /// Say what a file is; decode one texel of a baked map
 #[derive(Debug, Args)]
@@ -39,7 +40,7 @@ impl Inspect {
                 return Err(Error::Request(format!("{file}: is no baked map: it has no texels to decode")));
             }
             (None, None) => {
-                let report = self.source.describe(&self.file, self.builtin.size)?;
+                let report = self.source.describe(&self.file, &self.builtin)?;
                 report.warnings.iter().for_each(|warning| warn(&self.file, warning));
                 to_value(&report)?
             }

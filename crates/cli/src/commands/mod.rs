@@ -12,14 +12,19 @@ mod inspect;
 mod render;
 #[cfg(feature = "gpu")]
 mod shader;
+mod shell;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Parser, Subcommand};
 use serde::Serialize;
 use serde_json::Value;
 
 use ndfmap::Error;
+use ndfmap::maps::MapError;
+
+use crate::voice::{self, Verbosity, say};
 
 /// Bakes normal and displacement maps into filterable normal distribution maps, and measures what each
 /// method gains.
@@ -37,6 +42,15 @@ struct Global {
     /// Print one JSON document on stdout
     #[arg(long, global = true)]
     json: bool,
+    /// Print errors alone on stderr
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Print details on stderr: what tells that a picture is a map, and times
+    #[arg(short, long, global = true)]
+    verbose: bool,
+    /// Fail where a file would be replaced
+    #[arg(long, global = true)]
+    no_clobber: bool,
     /// Threads to use [default: one for each core]
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -51,11 +65,19 @@ enum Command {
     Render(Box<render::Render>),
     #[cfg(feature = "gpu")]
     Shader(shader::Shader),
+    Completions(shell::Completions),
+    Man(shell::Man),
 }
 
 impl Program {
     /// Runs the command.
     pub(crate) fn run(self) -> Result<(), Error> {
+        voice::set(match (self.global.quiet, self.global.verbose) {
+            (true, _) => Verbosity::Quiet,
+            (_, true) => Verbosity::Verbose,
+            _ => Verbosity::Usual,
+        });
+        NO_CLOBBER.store(self.global.no_clobber, Ordering::Relaxed);
         if let Some(threads) = self.global.threads {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
             pool.build_global().map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}")))?;
@@ -69,8 +91,25 @@ impl Program {
             Command::Render(command) => command.run(json),
             #[cfg(feature = "gpu")]
             Command::Shader(command) => command.run(json),
+            Command::Completions(command) => command.run(),
+            Command::Man(command) => command.run(),
         }
     }
+}
+
+/// Options whose value may be left out, and so needs an equals sign.
+const OPTIONAL_VALUES: [&str; 4] = ["--truth", "--displace", "--sampler", "--zstd"];
+
+/// Hint for a command line that could not be read, where a number follows such an option.
+pub(crate) fn equals_hint(arguments: impl Iterator<Item = String>) -> Option<String> {
+    let arguments: Vec<String> = arguments.collect();
+    let [option, value] = arguments
+        .windows(2)
+        .find(|two| OPTIONAL_VALUES.contains(&two[0].as_str()) && two[1].parse::<f64>().is_ok())?
+    else {
+        return None;
+    };
+    Some(format!("a value of `{option}` follows an equals sign: write `{option}={value}`"))
 }
 
 /// Prints text, or JSON, on stdout; a reader that hung up is not our failure.
@@ -89,8 +128,16 @@ fn print_bytes(bytes: &[u8]) -> Result<(), Error> {
     }
 }
 
+/// Prints a JSON document, with the program's version and its command line.
 fn print_json(value: &impl Serialize) -> Result<(), Error> {
-    print(&serde_json::to_string_pretty(value).map_err(|e| Error::Failed(e.to_string()))?)
+    let mut value = to_value(value)?;
+    if let Value::Object(document) = &mut value {
+        let arguments: Vec<String> =
+            std::env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned()).collect();
+        let program = serde_json::json!({ "version": env!("CARGO_PKG_VERSION"), "arguments": arguments });
+        document.insert("ndfmap".to_owned(), program);
+    }
+    print(&serde_json::to_string_pretty(&value).map_err(|e| Error::Failed(e.to_string()))?)
 }
 
 /// Returns a report as a JSON value, to which a command may add.
@@ -98,19 +145,44 @@ fn to_value(report: &impl Serialize) -> Result<Value, Error> {
     serde_json::to_value(report).map_err(|e| Error::Failed(e.to_string()))
 }
 
-/// Prints a warning on stderr.
-fn warn(map: &Path, warning: &str) {
-    eprintln!("ndfmap: warning: {}: {warning}", map.display());
-}
+/// True where no file may be replaced.
+static NO_CLOBBER: AtomicBool = AtomicBool::new(false);
 
-/// Says something of a file on stderr that is no warning.
-fn say(map: &Path, words: &str) {
-    eprintln!("ndfmap: {}: {words}", map.display());
-}
-
-/// Says that a file is about to be replaced.
-fn say_if_replaced(path: &Path) {
-    if path.exists() {
-        eprintln!("ndfmap: replacing {}", path.display());
+/// Makes way for a file: says that it is replaced, or refuses to.
+fn make_way(path: &Path) -> Result<(), Error> {
+    if path.is_dir() {
+        return Err(Error::Request(format!("{}: is a folder, not a file to write", path.display())));
     }
+    if !path.exists() {
+        return Ok(());
+    }
+    if NO_CLOBBER.load(Ordering::Relaxed) {
+        return Err(Error::Failed(format!("{}: is there, and `--no-clobber` keeps it", path.display())));
+    }
+    say(format_args!("replacing {}", path.display()));
+    Ok(())
+}
+
+/// Refuses outputs of which two would go into one file.
+fn check_apart<'a>(outputs: impl IntoIterator<Item = &'a PathBuf>) -> Result<(), Error> {
+    let mut seen = std::collections::HashSet::new();
+    for path in outputs {
+        if !seen.insert(path) {
+            return Err(Error::Request(format!("{}: is named for two outputs", path.display())));
+        }
+    }
+    Ok(())
+}
+
+/// Makes a folder for outputs.
+fn make_folder(folder: &Path) -> Result<(), Error> {
+    if folder.is_file() {
+        return Err(Error::Request(format!("{}: is a file, not a folder for the outputs", folder.display())));
+    }
+    std::fs::create_dir_all(folder).map_err(|e| MapError::io(folder, e).into())
+}
+
+/// Says what was written.
+fn say_written(files: &[PathBuf]) {
+    files.iter().for_each(|file| say(format_args!("wrote {}", file.display())));
 }

@@ -25,23 +25,29 @@ use ndfmap::{CameraSpec, DisplacementOptions, Error, SceneSpec, scene};
 use serde_json::{Map, Value, json};
 
 use super::arguments::{
-    EnvironmentArguments, Precision, SourceArguments, brdf_spelling, brdfs_help, environments_help,
-    method_spelling, methods_help, positive, read_brdf, scene_name, size,
+    BuiltinSize, EnvironmentArguments, Precision, SourceArguments, brdf_spelling, brdfs_help,
+    environments_help, method_spelling, methods_help, positive, read_brdf, scene_name, size,
 };
-use super::{print, print_json, say_if_replaced, to_value, warn};
+use super::{check_apart, make_way, print, print_json, say_written, to_value};
+#[cfg(feature = "gpu")]
+use crate::hushed::hushed;
 use crate::tables;
 use crate::terminal::Terminal;
+use crate::voice::{say, warn};
 
 /// Render a scene through baked maps, and by brute force to compare
 #[derive(Debug, Args)]
 #[command(after_long_help = [scenes_help(), methods_help(), brdfs_help(), environments_help()].join("\n\n"))]
 pub(super) struct Render {
-    /// A built-in scene, or a model: .gltf, .glb, .obj or .ply
+    /// A built-in scene, or a model: .gltf, .glb, .fbx, .obj or .ply
     #[arg(long, value_name = "NAME|FILE", value_parser = scene_name)]
     scene: String,
     /// A normal or height map, `builtin:NAME`, or a baked map, for the scene's first material
     #[arg(long)]
     map: Option<PathBuf>,
+    /// Material of a model that `--map`, `--diffuse` and `--specular` are for [default: that of its first mesh]
+    #[arg(long, value_name = "NAME")]
+    material: Option<String>,
     /// The picture to write, by the first method: .png as shown, .exr in linear light; several frames are
     /// numbered
     #[arg(short, long, value_name = "FILE", required_unless_present_any = ["compare", "truth_output", "json"])]
@@ -49,7 +55,7 @@ pub(super) struct Render {
     #[arg(short, long, value_delimiter = ',', value_parser = method_spelling, help = "Methods, separated by commas [default: vmf:4; displaced, slopes; or a baked map's own]")]
     method: Vec<String>,
     /// Render the truth too, with at most this many rays a pixel, and measure against it
-    #[arg(long, value_name = "RAYS", num_args = 0..=1, default_missing_value = "256",
+    #[arg(long, value_name = "RAYS", num_args = 0..=1, require_equals = true, default_missing_value = "256",
         value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     truth: Option<u32>,
     /// Stop the truth once its noise (relative L2) is below this
@@ -108,21 +114,20 @@ pub(super) struct Render {
     #[arg(long, default_value = "clip", value_parser = Tone::from_str)]
     tone: Tone,
     /// Device that renders
-    #[arg(long, value_enum, default_value_t = Device::Auto)]
+    #[arg(long, value_enum, ignore_case = true, default_value_t = Device::Auto)]
     device: Device,
     /// The GPU's own sampler filters maps in place of `--filter`: trilinear, or with up to TAPS taps
-    #[arg(long, value_name = "TAPS", num_args = 0..=1, default_missing_value = "1", conflicts_with_all = ["neighbours", "filter", "lod_bias"],
+    #[arg(long, value_name = "TAPS", num_args = 0..=1, require_equals = true, default_missing_value = "1", conflicts_with_all = ["neighbours", "filter", "lod_bias"],
         value_parser = clap::value_parser!(u16).range(1..=16))]
     sampler: Option<u16>,
     /// The GPU smooths outlines by four samples a pixel, as applications do, in place of 4 x 4 parts
     #[arg(long)]
     multisample: bool,
     /// Bits of a stored channel
-    #[arg(long, value_enum, default_value_t = Precision::Half)]
+    #[arg(long, value_enum, ignore_case = true, default_value_t = Precision::Half)]
     precision: Precision,
-    /// Size of built-in maps
-    #[arg(long, value_name = "SIZE", value_parser = size)]
-    map_size: Option<Size>,
+    #[command(flatten)]
+    builtin: BuiltinSize,
     #[command(flatten)]
     source: SourceArguments,
 }
@@ -132,7 +137,7 @@ pub(super) struct Render {
 pub(super) struct DisplaceArguments {
     /// Height maps displace what they lie on, by SCALE times what keeps their slopes; lobes become
     /// microfacets, and the truth is that of the displaced surface
-    #[arg(long, value_name = "SCALE", num_args = 0..=1, default_missing_value = "1", value_parser = scale,
+    #[arg(long, value_name = "SCALE", num_args = 0..=1, require_equals = true, default_missing_value = "1", value_parser = scale,
         allow_negative_numbers = true, requires = "scene")]
     displace: Option<f64>,
     /// Facets of displaced surfaces shade each other. The truth has every shadow; methods, those that facets
@@ -198,15 +203,15 @@ impl Device {
     fn open(self) -> Result<Option<ndfmap::gpu::Device>, Error> {
         let opened = match self {
             Self::Cpu => return Ok(None),
-            Self::Gpu => return Ok(Some(ndfmap::gpu::Device::open()?)),
-            Self::Auto => ndfmap::gpu::Device::open(),
+            Self::Gpu => return Ok(Some(hushed(ndfmap::gpu::Device::open)?)),
+            Self::Auto => hushed(ndfmap::gpu::Device::open),
         };
         let said = match opened {
             Ok(device) if !device.is_software() => return Ok(Some(device)),
             Ok(device) => format!("the only GPU is {}", device.description()),
             Err(e) => e.to_string(),
         };
-        eprintln!("ndfmap: {said}: rendering on the processor");
+        say(format_args!("{said}: rendering on the processor"));
         Ok(None)
     }
 }
@@ -321,6 +326,7 @@ impl Render {
         {
             return Err(Error::Request(format!("{}: contact sheets are written as .png", sheet.display())));
         }
+        check_apart(self.output.iter().chain(&self.truth_output).chain(&self.compare))?;
         let baked = self.read_baked()?;
         let usual = if self.displace.displace.is_some() { "slopes" } else { "vmf:4" };
         let own = baked.as_ref().map_or_else(|| usual.to_owned(), |map| map.method.to_string());
@@ -376,16 +382,14 @@ impl Render {
         let report = self.render(&job, &terminal, write)?;
         if let Some(sheet) = &self.compare {
             let title = format!("{}  {} x {}", self.scene, self.size.width, self.size.height);
-            say_if_replaced(sheet);
+            make_way(sheet)?;
             atomic::write(sheet, &contact_sheet(&report, &title)?)?;
             written.push(sheet.clone());
         }
-        for file in &written {
-            eprintln!("ndfmap: wrote {}", file.display());
-        }
+        say_written(&written);
         if json {
             let environment = scene.environment.as_ref().map(|e| self.environment.to_json(e));
-            print_json(&self.to_json(&report, environment, start.elapsed().as_secs_f64())?)
+            print_json(&self.to_json(&report, &written, environment, start.elapsed().as_secs_f64())?)
         } else {
             print(&tables::rendering(&report))
         }
@@ -436,9 +440,7 @@ impl Render {
         let map = match (baked, &self.map) {
             (Some(baked), _) => Some(baked.into()),
             (None, Some(path)) => {
-                let size = self.map_size.unwrap_or(Size { width: 512, height: 512 });
-                let map = self.source.read(path, size)?;
-                map.warnings.iter().for_each(|w| warn(path, w));
+                let map = self.source.read(path, &self.builtin)?;
                 Some(map.surface.into())
             }
             (None, None) => None,
@@ -446,7 +448,8 @@ impl Render {
         Ok(SceneSpec {
             scene: self.scene.clone(),
             map,
-            map_size: self.map_size,
+            material: self.material.clone(),
+            map_size: self.builtin.map_size,
             lobe: self.brdf.as_deref().map(read_brdf).transpose()?,
             shading: self.model,
             camera: self.camera,
@@ -472,7 +475,7 @@ impl Render {
         for (path, picture) in [(&self.output, picture), (&self.truth_output, truth)] {
             let (Some(path), Some(picture)) = (path, picture) else { continue };
             let path = if frames > 1 { numbered(path, at) } else { path.clone() };
-            say_if_replaced(&path);
+            make_way(&path)?;
             if self.tone != Tone::Clip && matches!(picture_writer(&path)?, WritePicture::Display(_)) {
                 let shown = |x, y| self.tone.map(picture.row(y)[x] * frame.exposure);
                 write_picture(&path, &Grid::from_fn(picture.size(), shown), 1.0)?;
@@ -487,6 +490,7 @@ impl Render {
     fn to_json(
         &self,
         report: &RenderReport,
+        written: &[PathBuf],
         environment: Option<Value>,
         seconds: f64,
     ) -> Result<Value, Error> {
@@ -496,6 +500,7 @@ impl Render {
         let first = &methods[&report.methods[0]];
         let mut value = json!({
             "scene": self.scene,
+            "files": written,
             "method": report.methods[0],
             "device": device["device"],
             "width": self.size.width,

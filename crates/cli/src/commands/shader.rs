@@ -1,5 +1,6 @@
 //! `ndfmap shader`: decoding and shading of one method, in the language of another program.
 
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -10,7 +11,7 @@ use ndfmap::gpu::export::{Export, Language, TABLE};
 use serde_json::json;
 
 use super::arguments::{brdf_spelling, brdfs_help, method_spelling, methods_help, read_brdf};
-use super::{print_bytes, print_json, say_if_replaced};
+use super::{make_way, print_bytes, print_json, say_written};
 use ndfmap::Error;
 
 /// Write the shader of a method, for other programs
@@ -35,12 +36,16 @@ pub(super) struct Shader {
 }
 
 fn languages_help() -> String {
-    let rows = TABLE.iter().map(|row| format!("  {:8} {}", row.name, row.summary));
+    let rows = TABLE.iter().map(|row| {
+        let also = row.aliases.join(", ");
+        format!("  {:8} {}; also {also}", row.name, row.summary)
+    });
     format!("Languages:\n{}", rows.collect::<Vec<_>>().join("\n"))
 }
 
 fn find(name: &str) -> Option<&'static Language> {
-    TABLE.iter().find(|row| row.name == name)
+    let small = name.to_lowercase();
+    TABLE.iter().find(|row| row.name == small || row.aliases.contains(&small.as_str()))
 }
 
 fn language(text: &str) -> Result<&'static str, String> {
@@ -56,9 +61,9 @@ impl Shader {
         let language = find(self.lang).unwrap_or(&TABLE[0]);
         let bytes = Export { method: &*method, brdf: &brdf }.to(language)?;
         if let Some(file) = &self.output {
-            say_if_replaced(file);
+            make_way(file)?;
             ndfmap::maps::atomic::write(file, &bytes)?;
-            eprintln!("ndfmap: wrote {}", file.display());
+            say_written(std::slice::from_ref(file));
         }
         if json {
             // Without a file the text goes into the document; a shader that is not text needs a file.
@@ -77,6 +82,13 @@ impl Shader {
                 "text": text,
             }));
         }
-        if self.output.is_none() { print_bytes(&bytes) } else { Ok(()) }
+        if self.output.is_some() {
+            return Ok(());
+        }
+        if std::io::stdout().is_terminal() && str::from_utf8(&bytes).is_err() {
+            let why = "is no text for a terminal: name a file with `-o`, or send it to another program";
+            return Err(Error::Request(format!("{} {why}", language.name)));
+        }
+        print_bytes(&bytes)
     }
 }

@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use std::fmt::{self, Display};
 
 use super::{AnyLobe, Lobe, Microfacets, Row, Widen, number, twin};
-use crate::units::{Alpha, SlopeVariance};
+use crate::units::{Alpha, PerceptualRoughness, SlopeVariance};
 
 /// A GGX distribution of microfacets.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,9 +29,18 @@ impl Ggx {
 pub(super) const ROW: Row = Row {
     name: "ggx",
     parameter: ":ALPHA",
-    summary: "GGX (Trowbridge-Reitz) microfacet distribution D(n·h)",
+    summary: "GGX (Trowbridge-Reitz) microfacet distribution D(n·h); alpha is roughness²",
     parse: |text| Ok(AnyLobe::from(Ggx::new(number(text, Alpha::new)?))),
     samples: &["ggx:0.1", "ggx:0.4"],
+};
+
+/// The same lobe, by the number of material editors.
+pub(super) const ROUGHNESS: Row = Row {
+    name: "roughness",
+    parameter: ":R",
+    summary: "GGX by the roughness of glTF and of material editors: alpha is its square",
+    parse: |text| Ok(AnyLobe::from(Ggx::new(number(text, PerceptualRoughness::new)?.into()))),
+    samples: &["roughness:0.45"],
 };
 
 impl Display for Ggx {

@@ -23,7 +23,7 @@ pub use lobe::{AnyLobe, Argument, Lobe, LobeObject, Widen, zonal_by_quadrature};
 pub use measured::{LobeFactors, Measured, PublishedFit};
 pub use microfacets::Microfacets;
 pub use shading::{Brdf, Directions, LEAST_COSINE, ShadingModel, SurfaceParams};
-pub use table::{ParseLobeError, Row, TABLE};
+pub use table::{ALIASES, ParseLobeError, Row, TABLE};
 pub use torrance_sparrow::TorranceSparrow;
 
 use lobe::twin;

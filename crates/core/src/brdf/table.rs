@@ -29,6 +29,9 @@ pub static TABLE: &[Row] = &[
     measured::ABC,
 ];
 
+/// Other spellings of lobes in [`TABLE`].
+pub static ALIASES: &[Row] = &[ggx::ROUGHNESS];
+
 /// A spelling that names no lobe.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -49,23 +52,25 @@ pub enum ParseLobeError {
 impl FromStr for AnyLobe {
     type Err = ParseLobeError;
 
-    /// Reads a spelling such as `blinn-phong:50`, `ggx:0.2` or `lambert`.
+    /// Reads a spelling such as `blinn-phong:50`, `ggx:0.2`, `roughness:0.45` or `lambert`; its name in small
+    /// letters or capitals.
     fn from_str(spelling: &str) -> Result<Self, ParseLobeError> {
         let (name, parameter) = spelling.split_once(':').unwrap_or((spelling, ""));
         let row = TABLE
             .iter()
-            .find(|row| row.name == name)
+            .chain(ALIASES)
+            .find(|row| row.name.eq_ignore_ascii_case(name))
             .ok_or_else(|| ParseLobeError::Unknown(name.to_owned()))?;
-        (row.parse)(parameter)
-            .map_err(|reason| ParseLobeError::Parameter { spelling: spelling.to_owned(), reason })
+        let wrong = |reason| ParseLobeError::Parameter { spelling: spelling.to_owned(), reason };
+        if parameter.is_empty() && !row.parameter.is_empty() {
+            return Err(wrong(format!("{} must follow, as in `{}`", &row.parameter[1..], row.samples[0])));
+        }
+        (row.parse)(parameter).map_err(wrong)
     }
 }
 
 /// Reads the one number of a lobe into its unit.
 pub(super) fn number<U, E: ToString>(text: &str, unit: fn(f64) -> Result<U, E>) -> Result<U, String> {
-    if text.is_empty() {
-        return Err("a number must follow, as in `name:0.5`".to_owned());
-    }
     let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
     unit(value).map_err(|e| e.to_string())
 }

@@ -20,6 +20,7 @@ pub struct Fixed;
 
 pub(super) const ROW: Row = Row {
     name: "fixed",
+    aliases: &[],
     parameters: "",
     summary: "the fine lobe around the filtered n.xy, z rebuilt: what two-channel normal maps do",
     paper: "Tan et al. 2005 (baseline)",

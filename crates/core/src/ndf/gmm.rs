@@ -32,6 +32,7 @@ pub struct Gmm {
 
 pub(super) const ROW: Row = Row {
     name: "gmm",
+    aliases: &[],
     parameters: ":J[:ALIGNMENT][:printed]",
     summary: "J = 1..8 planar Gaussians, aligned as `vmf` is; `prior` is the paper's own",
     paper: "Tan et al. 2005, section 4; refined is ours",

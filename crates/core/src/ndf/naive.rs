@@ -22,6 +22,7 @@ pub struct Naive;
 
 pub(super) const ROW: Row = Row {
     name: "naive",
+    aliases: &[],
     parameters: "",
     summary: "the fine lobe around the mean normal, renormalised",
     paper: "Han et al. 2007 (baseline)",

@@ -67,6 +67,7 @@ pub struct Ndm {
 
 pub(super) const ROW: Row = Row {
     name: "ndm",
+    aliases: &[],
     parameters: "[:KERNEL][:NORMALISATION]",
     summary: "3-D Gaussian of the normals, restricted to the sphere; kernels brdf, gaussian, pearson; \
               normalisations partial, integrated, plane",

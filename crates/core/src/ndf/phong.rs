@@ -28,6 +28,7 @@ pub struct Phong {
 
 pub(super) const ROW: Row = Row {
     name: "phong",
+    aliases: &[],
     parameters: ":J",
     summary: "J = 1..8 Phong peaks by least squares; not filterable, every texel's peaks are shaded",
     paper: "Fournier 1992; baseline of Tan et al. 2005",

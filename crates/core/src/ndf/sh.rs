@@ -28,6 +28,7 @@ pub struct Sh {
 
 pub(super) const ROW: Row = Row {
     name: "sh",
+    aliases: &[],
     parameters: ":L[:printed]",
     summary: "spherical harmonics of order L = 2..16, exact for wide lobes and Lambert",
     paper: "Han et al. 2007, section 5",

@@ -62,6 +62,7 @@ impl Default for Slopes {
 
 pub(super) const ROW: Row = Row {
     name: "slopes",
+    aliases: &["lean", "leadr"],
     parameters: "[:N[:drawn]]",
     summary: "one anisotropic Gaussian of slopes, with the mean height; N × N of them (5) under environments and for displaced diffuse facets",
     paper: "Olano and Baker 2010 (LEAN); Dupuy et al. 2013 (LEADR)",

@@ -9,6 +9,8 @@ use super::{AnyMethod, Representation, fixed, gmm, naive, ndm, phong, sh, slopes
 pub struct Row {
     /// The word before the first colon.
     pub name: &'static str,
+    /// Other names that people know it by.
+    pub aliases: &'static [&'static str],
     /// Parameters that may follow the name, for help.
     pub parameters: &'static str,
     /// Summary in one line, for help and docs.
@@ -97,12 +99,13 @@ pub enum ParseMethodError {
 impl FromStr for AnyMethod {
     type Err = ParseMethodError;
 
-    /// Reads a spelling such as `toksvig`, `sh:7` or `ndm:pearson:integrated`.
+    /// Reads a spelling such as `toksvig`, `sh:7` or `ndm:pearson:integrated`, in small letters or capitals.
     fn from_str(spelling: &str) -> Result<Self, ParseMethodError> {
-        let words: Vec<&str> = spelling.split(':').collect();
+        let small = spelling.to_lowercase();
+        let words: Vec<&str> = small.split(':').collect();
         let row = TABLE
             .iter()
-            .find(|row| row.name == words[0])
+            .find(|row| row.name == words[0] || row.aliases.contains(&words[0]))
             .ok_or_else(|| ParseMethodError::Unknown(words[0].to_owned()))?;
         (row.parse)(&words[1..])
             .map_err(|reason| ParseMethodError::Parameter { spelling: spelling.to_owned(), reason })

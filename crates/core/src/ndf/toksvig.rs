@@ -23,6 +23,7 @@ pub struct Toksvig;
 
 pub(super) const ROW: Row = Row {
     name: "toksvig",
+    aliases: &[],
     parameters: "",
     summary: "the lobe widened by the shortening of the mean normal",
     paper: "Toksvig 2005",

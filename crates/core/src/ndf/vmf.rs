@@ -34,6 +34,7 @@ pub struct Vmf {
 
 pub(super) const ROW: Row = Row {
     name: "vmf",
+    aliases: &[],
     parameters: ":J[:ALIGNMENT][:origin]",
     summary: "J = 1..8 von Mises-Fisher lobes, aligned: refined (default), parent, prior, matched or unaligned",
     paper: "Han et al. 2007, section 6; refined is ours",

@@ -20,6 +20,8 @@ use crate::link::{Linked, check};
 pub struct Language {
     /// Spelling on the command line.
     pub name: &'static str,
+    /// Other names that people know it by.
+    pub aliases: &'static [&'static str],
     /// Summary in one line, for help and docs.
     pub summary: &'static str,
     /// Call of the library; `None` for a language without text to include, and so without a library.
@@ -41,6 +43,7 @@ const COMBINED: &str = "ndf_shade(map, uv, place)";
 pub static TABLE: &[Language] = &[
     Language {
         name: "wgsl",
+        aliases: &["webgpu"],
         summary: "WebGPU Shading Language: our own text, with its comments",
         call: Some(WITH_SAMPLER),
         own_text: true,
@@ -48,6 +51,7 @@ pub static TABLE: &[Language] = &[
     },
     Language {
         name: "glsl",
+        aliases: &["opengl", "vulkan-glsl"],
         summary: "GLSL 4.50, to be included after `#version`",
         call: Some(COMBINED),
         own_text: false,
@@ -55,6 +59,7 @@ pub static TABLE: &[Language] = &[
     },
     Language {
         name: "glsl-es",
+        aliases: &["webgl", "essl"],
         summary: "GLSL ES 3.00 (WebGL 2), to be included after `#version`",
         call: Some(COMBINED),
         own_text: false,
@@ -62,6 +67,7 @@ pub static TABLE: &[Language] = &[
     },
     Language {
         name: "hlsl",
+        aliases: &["directx", "d3d"],
         summary: "HLSL, shader model 5.1 and up",
         call: Some(WITH_SAMPLER),
         own_text: false,
@@ -69,6 +75,7 @@ pub static TABLE: &[Language] = &[
     },
     Language {
         name: "msl",
+        aliases: &["metal"],
         summary: "Metal Shading Language 2.4",
         call: Some(WITH_SAMPLER),
         own_text: false,
@@ -76,6 +83,7 @@ pub static TABLE: &[Language] = &[
     },
     Language {
         name: "spirv",
+        aliases: &["spir-v", "vulkan"],
         summary: "SPIR-V 1.3: a fragment shader `main`, map and sampler at set 0, bindings 0 and 1",
         call: None,
         own_text: false,

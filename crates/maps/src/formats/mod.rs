@@ -161,6 +161,13 @@ pub fn detect(path: &Path, bytes: &[u8]) -> Result<&'static Format, MapError> {
     Err(MapError::invalid(path, reason))
 }
 
+/// True for a name that pictures have.
+#[must_use]
+pub fn is_picture(path: &Path) -> bool {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    TABLE.iter().any(|format| format.extensions.contains(&extension.as_str()))
+}
+
 /// Format to write a map in, by the file's name.
 ///
 /// # Errors

@@ -60,6 +60,8 @@ pub static TABLE: &[ModelFormat] = &[
 pub struct ModelOptions {
     /// A map for the first material, in place of its own; the time is ignored.
     pub staging: SceneOptions,
+    /// Name of the material that comes first; `None` for that of the first mesh.
+    pub material: Option<String>,
 }
 
 /// Meshes and their materials.
@@ -139,8 +141,8 @@ fn scene_of(
     if parts.materials.is_empty() {
         parts.materials.push(plain());
     }
-    // The first mesh's material becomes the first, for whoever changes the first material later.
-    let first = parts.meshes[0].1;
+    // It becomes the first, for whoever changes the first material later.
+    let first = first_material(path, &parts, options.material.as_deref())?;
     parts.materials.swap(0, first);
     for (_, material) in &mut parts.meshes {
         *material = match *material {
@@ -150,6 +152,12 @@ fn scene_of(
         };
     }
     if let Some(map) = &options.staging.map {
+        if options.material.is_none() && used_materials(&parts).len() > 1 {
+            let (name, others) = (&parts.materials[0].name, used_materials(&parts)[1..].join("`, `"));
+            warnings.push(format!(
+                "the map is laid on its material `{name}`; others are `{others}` (`--material`)"
+            ));
+        }
         parts.materials[0].map = map.clone();
         if parts.materials[0].textures.take().is_some() {
             warnings.push(
@@ -181,6 +189,22 @@ fn scene_of(
     let eye = middle + DVec3::new(0.35, 0.25, 1.0).normalize() * distance;
     scene.camera = Camera::new(eye.into(), middle.into(), 35.0);
     Ok(scene)
+}
+
+/// Names of the materials that meshes have, in their order in the file.
+fn used_materials(parts: &Parts) -> Vec<&str> {
+    let used = |i: &usize| parts.meshes.iter().any(|(_, material)| material == i);
+    (0..parts.materials.len()).filter(used).map(|i| parts.materials[i].name.as_str()).collect()
+}
+
+/// Index of the material of this name, or of the first mesh's.
+fn first_material(path: &Path, parts: &Parts, name: Option<&str>) -> Result<usize, MapError> {
+    let Some(name) = name else { return Ok(parts.meshes[0].1) };
+    let used = |i: &usize| parts.meshes.iter().any(|(_, material)| material == i);
+    (0..parts.materials.len()).filter(used).find(|i| parts.materials[*i].name == name).ok_or_else(|| {
+        let names = used_materials(parts).join("`, `");
+        MapError::unsupported(path, format!("has no material `{name}` on its meshes; they have `{names}`"))
+    })
 }
 
 /// A flat map.

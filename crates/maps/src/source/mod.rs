@@ -95,10 +95,17 @@ pub fn read_source(map: &Path, options: &SourceOptions) -> Result<SourceMap, Map
     if let Some(name) = map.to_str().and_then(|m| m.strip_prefix(BUILTIN_PREFIX)) {
         return builtin(map, name, options);
     }
-    let bytes = read_file(map)?;
-    let image = read_image(map, &bytes)?;
-    let sha256 = Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect();
-    drop(bytes);
+    source_of_bytes(map, &read_file(map)?, options)
+}
+
+/// Reads the bytes of a whole file. The path names it, and tells the format of those few that have no
+/// signature.
+///
+/// # Errors
+/// [`MapError`], as for a file.
+pub fn source_of_bytes(map: &Path, bytes: &[u8], options: &SourceOptions) -> Result<SourceMap, MapError> {
+    let image = read_image(map, bytes)?;
+    let sha256 = Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect();
     source_of_image(map, image, sha256, options)
 }
 
