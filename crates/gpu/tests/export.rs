@@ -142,3 +142,24 @@ fn metal_has_no_bindings_and_our_names() {
         assert!(!text.contains("[[buffer(") && !text.contains("fragment "), "{name}");
     }
 }
+
+#[test]
+fn wgsl_names_are_the_librarys_own() {
+    for (name, bytes) in all("wgsl") {
+        let text = String::from_utf8(bytes).unwrap();
+        let module = naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let functions = module.functions.iter().filter_map(|(_, function)| function.name.as_ref());
+        let constants = module.constants.iter().filter_map(|(_, constant)| constant.name.as_ref());
+        let types = module.types.iter().filter_map(|(_, ty)| ty.name.as_ref());
+        for item in functions.chain(constants).chain(types) {
+            assert!(item.to_lowercase().starts_with("ndf"), "{name}: {item}");
+        }
+    }
+}
+
+#[test]
+fn hlsl_structs_have_no_padding() {
+    for (name, bytes) in all("hlsl") {
+        assert!(!String::from_utf8(bytes).unwrap().contains("_pad"), "{name}");
+    }
+}

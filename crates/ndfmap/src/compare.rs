@@ -1,5 +1,6 @@
 //! Bakes a surface with several methods and measures each against the truth, level by level.
 
+use std::path::PathBuf;
 use std::time::Instant;
 
 use ndfmap_core::bake::Bake;
@@ -9,10 +10,13 @@ use ndfmap_core::measure::{
     FilteringError, TexelTruth, filtering_error, lattice_for, level_error, true_corners, true_levels,
 };
 use ndfmap_core::ndf::AnyMethod;
-use ndfmap_core::observe::{Cancelled, Observer};
+use ndfmap_core::observe::Observer;
 use ndfmap_core::pyramid::{Precision, Pyramid, level_sizes};
 use ndfmap_core::surface::Surface;
+use ndfmap_maps::{MapError, NdfMap};
 use serde::{Serialize, Serializer};
+
+use crate::Error;
 
 /// Subject of a comparison.
 pub struct Subject<'a> {
@@ -24,10 +28,20 @@ pub struct Subject<'a> {
     pub lobe: &'a dyn Lobe,
     /// Methods that bake it.
     pub methods: &'a [AnyMethod],
+    /// Maps that were baked from it before, each with its name.
+    pub baked: &'a [BakedFile],
     /// Bits of a stored channel.
     pub precision: Precision,
     /// True to measure between texels too.
     pub filtering: bool,
+}
+
+/// Map that was baked before, as its file holds it.
+pub struct BakedFile {
+    /// Name of the file.
+    pub path: PathBuf,
+    /// The map.
+    pub map: NdfMap,
 }
 
 /// Comparison of methods on a map; its JSON form is the output of `ndfmap compare --json`.
@@ -52,7 +66,7 @@ pub struct Comparison {
 /// Map and errors of one method.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// Spelling of the method.
+    /// Spelling of the method, or name of a baked file.
     #[serde(skip)]
     pub method: String,
     /// Bytes of a texel of the finest level.
@@ -103,11 +117,21 @@ fn filtering_errors<S: Serializer>(errors: &[FilteringError], serializer: S) -> 
 /// Bakes and measures.
 ///
 /// # Errors
-/// [`Cancelled`] by the observer.
-pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Comparison, Cancelled> {
+/// [`Error::Cancelled`] by the observer, and [`Error::Map`] for a baked map of another size.
+pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Comparison, Error> {
     let lattice = lattice_for(subject.lobe);
     let size = subject.surface.size();
     let sizes = level_sizes(size);
+    for BakedFile { path, map } in subject.baked {
+        if map.pyramid.sizes()[0] != size {
+            let own = map.pyramid.sizes()[0];
+            let reason = format!(
+                "is {} × {}, and {} is {} × {}: it was not baked from it",
+                own.width, own.height, subject.name, size.width, size.height
+            );
+            return Err(MapError::unsupported(path, reason).into());
+        }
+    }
     observer.begin("truth");
     let truth = TexelTruth::new(subject.surface, subject.lobe, &lattice);
     let part = if subject.filtering { 0.5 } else { 1.0 };
@@ -115,29 +139,58 @@ pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Compari
     // Level 0 is the map itself, filtered as maps have always been.
     let levels: Vec<usize> = if subject.filtering { (1..sizes.len()).collect() } else { Vec::new() };
     let corners = true_corners(&truth, subject.surface.wraps(), &levels, &observer.part(part, 1.0))?;
+    let measured = |method: &AnyMethod, pyramid: &Pyramid| Measured {
+        levels: truths
+            .iter()
+            .enumerate()
+            .map(|(level, truth)| LevelError {
+                level,
+                error: level_error(pyramid, &**method, subject.lobe, &lattice, truth),
+            })
+            .collect(),
+        filtering: corners
+            .iter()
+            .map(|truth| filtering_error(pyramid, &**method, subject.lobe, &lattice, truth))
+            .collect(),
+    };
     let mut rows = Vec::new();
+    for BakedFile { path, map } in subject.baked {
+        let method = map.method(path)?;
+        observer.begin(&path.display().to_string());
+        let Measured { levels, filtering } = measured(&method, &map.pyramid);
+        rows.push(Row {
+            method: path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
+            bytes_per_texel: map.pyramid.layers() * map.pyramid.precision().texel_bytes(),
+            bake_seconds: 0.0,
+            pyramid: map.pyramid.clone(),
+            levels,
+            filtering,
+        });
+    }
     for method in subject.methods {
         observer.begin(&method.to_string());
         let start = Instant::now();
         let bake = Bake::new(subject.surface, &**method).precision(subject.precision).observer(observer);
         let (pyramid, _) = bake.to_pyramid()?;
         let bake_seconds = start.elapsed().as_secs_f64();
-        let error = |(level, truth)| LevelError {
-            level,
-            error: level_error(&pyramid, &**method, subject.lobe, &lattice, truth),
-        };
-        let between = |truth| filtering_error(&pyramid, &**method, subject.lobe, &lattice, truth);
+        let Measured { levels, filtering } = measured(method, &pyramid);
         rows.push(Row {
             method: method.to_string(),
             bytes_per_texel: method.layers() * subject.precision.texel_bytes(),
             bake_seconds,
-            levels: truths.iter().enumerate().map(error).collect(),
-            filtering: corners.iter().map(between).collect(),
+            levels,
+            filtering,
             pyramid,
         });
     }
     let (map, brdf) = (subject.name.to_owned(), subject.lobe.to_string());
     Ok(Comparison { map, width: size.width, height: size.height, brdf, sizes, rows })
+}
+
+/// Errors of one row.
+struct Measured {
+    levels: Vec<LevelError>,
+    filtering: Vec<FilteringError>,
 }
 
 /// A number in six columns, three significant digits where it matters.

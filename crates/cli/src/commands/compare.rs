@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
-use ndfmap::compare::{Comparison, Subject, compare};
+use ndfmap::compare::{BakedFile, Comparison, Subject, compare};
 use ndfmap::core::brdf::{AnyLobe, Lobe};
 use ndfmap::core::grid::Size;
 use ndfmap::core::lookup::Lookups;
 use ndfmap::core::ndf::AnyMethod;
 use ndfmap::core::pyramid;
 use ndfmap::maps::atomic;
+use ndfmap::maps::formats::{read_file, read_ndf};
 use ndfmap::maps::source::SourceMap;
 use ndfmap::render::{Device, RenderJob, RenderReport, render};
 use ndfmap::report::{self, Pages, ReportFile};
@@ -37,9 +38,12 @@ pub(super) struct Compare {
     /// The map: a picture file, or `builtin:NAME`
     map: PathBuf,
     /// Methods, separated by commas
-    #[arg(short, long, visible_alias = "methods", value_delimiter = ',', default_value = DEFAULT_METHODS,
-        value_parser = method_spelling)]
+    #[arg(short, long, alias = "methods", value_delimiter = ',', value_parser = method_spelling,
+        help = format!("Methods, separated by commas [default: {DEFAULT_METHODS}]"))]
     method: Vec<String>,
+    /// Measure these files too, which were baked from the map, as they are; without `--method`, them alone
+    #[arg(long, value_name = "FILE", value_delimiter = ',')]
+    baked: Vec<PathBuf>,
     /// The reflectance lobe they are measured with
     #[arg(long, default_value = "blinn-phong:50", value_parser = brdf_spelling)]
     brdf: String,
@@ -83,22 +87,33 @@ pub(super) struct Compare {
 impl Compare {
     pub(super) fn run(self, json: bool) -> Result<(), Error> {
         let mut methods: Vec<AnyMethod> = Vec::new();
-        for spelling in &self.method {
+        let usual: Vec<String> = DEFAULT_METHODS.split(',').map(str::to_owned).collect();
+        let asked = match (&self.method[..], &self.baked[..]) {
+            ([], []) => &usual[..],
+            (asked, _) => asked,
+        };
+        for spelling in asked {
             let method: AnyMethod = spelling.parse()?;
             // Two spellings of one method would share a key in the JSON.
             if !methods.contains(&method) {
                 methods.push(method);
             }
         }
+        if methods.is_empty() && self.scene.is_some() {
+            let why = "`--scene` renders methods: name them with `--method` beside `--baked`";
+            return Err(Error::Request(why.to_owned()));
+        }
         if self.sparkle {
             check_drift(self.size)?;
         }
         let map = self.source.read(&self.map, &self.builtin)?;
+        let baked = self.baked.iter().map(|path| open_baked(path)).collect::<Result<Vec<_>, _>>()?;
         let environment = self.environment.read()?;
         let brdf: AnyLobe = read_brdf(&self.brdf)?;
         let run = Run {
             map: &map,
             methods: &methods,
+            baked: &baked,
             brdf: &*brdf,
             precision: self.precision.into(),
             filtering: self.filtering,
@@ -145,10 +160,20 @@ impl Compare {
     }
 }
 
+/// Opens a file that was baked before.
+fn open_baked(path: &Path) -> Result<BakedFile, Error> {
+    let map = read_ndf(path, &read_file(path)?)?.ok_or_else(|| {
+        let why = "is no baked map: the map to compare comes first, and `--baked` names what was baked of it";
+        Error::Request(format!("{}: {why}", path.display()))
+    })?;
+    Ok(BakedFile { path: path.to_owned(), map })
+}
+
 /// Comparison of a source, perhaps with pictures and a report.
 pub(super) struct Run<'a> {
     pub(super) map: &'a SourceMap,
     pub(super) methods: &'a [AnyMethod],
+    pub(super) baked: &'a [BakedFile],
     pub(super) brdf: &'a dyn Lobe,
     pub(super) precision: pyramid::Precision,
     pub(super) filtering: bool,
@@ -185,6 +210,7 @@ impl Run<'_> {
             surface: &*self.map.surface,
             lobe: self.brdf,
             methods: self.methods,
+            baked: self.baked,
             precision: self.precision,
             filtering: self.filtering,
         };

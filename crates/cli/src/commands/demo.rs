@@ -71,6 +71,7 @@ impl Demo {
         let run = Run {
             map: &map,
             methods: &methods,
+            baked: &[],
             brdf: &*read_brdf(BRDF)?,
             precision: Precision::Half,
             filtering: false,

@@ -4,6 +4,8 @@
 //! from the same text, as a library of functions whose names begin with `ndf_`, so that they stand in an
 //! engine's own shader without a clash. SPIR-V is no text to include: it is a whole fragment shader.
 
+mod names;
+
 use std::fmt::Write as _;
 
 use naga::back;
@@ -13,6 +15,7 @@ use ndfmap_core::ndf::Method;
 use ndfmap_core::shader::{self, LOOKUP};
 use ndfmap_core::units::SlopeVariance;
 
+use self::names::{PREFIX, foreign, is_own, prefixed};
 use crate::GpuError;
 use crate::link::{Linked, check};
 
@@ -47,7 +50,7 @@ pub static TABLE: &[Language] = &[
         summary: "WebGPU Shading Language: our own text, with its comments",
         call: Some(WITH_SAMPLER),
         own_text: true,
-        write: |linked| Ok(linked.text.clone().into_bytes()),
+        write: |linked| Ok(prefixed(&linked.text, &foreign(&linked.module)).into_bytes()),
     },
     Language {
         name: "glsl",
@@ -178,9 +181,9 @@ fn private(linked: &Linked) -> Result<(naga::Module, naga::valid::ModuleInfo), S
     compact(&mut module, KeepUnused::No);
     let own = |name: &mut Option<String>| {
         if let Some(name) = name
-            && !name.to_lowercase().starts_with("ndf")
+            && !is_own(name)
         {
-            name.insert_str(0, "ndf_");
+            name.insert_str(0, PREFIX);
         }
     };
     module.functions.iter_mut().for_each(|(_, function)| own(&mut function.name));
@@ -250,7 +253,14 @@ fn hlsl(linked: &Linked) -> Result<Vec<u8>, String> {
     back::hlsl::Writer::new(&mut text, &options, &pipeline)
         .write(&module, &info, None)
         .map_err(|e| e.to_string())?;
-    Ok(text.into_bytes())
+    // Structs are filled by their callers, and in no buffer: the members that would align them are no use.
+    let padding =
+        |line: &&str| ["int _pad", "int _end_pad"].iter().any(|pad| line.trim_start().starts_with(pad));
+    Ok(text
+        .lines()
+        .filter(|line| !padding(line))
+        .fold(String::new(), |text, line| text + line + "\n")
+        .into_bytes())
 }
 
 fn msl(linked: &Linked) -> Result<Vec<u8>, String> {

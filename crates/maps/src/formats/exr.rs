@@ -111,7 +111,10 @@ fn read_image(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
     check_header(path, bytes)?;
     let meta = metadata(path, bytes)?;
     if header_text(&meta).is_some() || has_bumpslopes(&meta) {
-        return Err(MapError::unsupported(path, "is already a baked map; `inspect` reads it"));
+        return Err(MapError::unsupported(
+            path,
+            "is already a baked map: `inspect` reads it, and `compare MAP --baked FILE` measures it",
+        ));
     }
     let image = guarded(path, || {
         let reader = read().no_deep_data().largest_resolution_level().all_channels();

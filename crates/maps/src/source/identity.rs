@@ -145,7 +145,7 @@ pub fn identify(path: &Path, image: &Image) -> Identity {
     let length = statistics.unit_sentence("0 to 1");
     if let Samples::F32(values) = &image.samples
         && is_environment_size(image.size)
-        && values.iter().all(|v| !(*v < 0.0))
+        && values.iter().all(|v| *v >= 0.0 || v.is_nan())
         && values.iter().any(|v| *v > 1.0)
     {
         let shape = "holds light brighter than 1, in the shape of a panorama or a cube".to_owned();
