@@ -7,12 +7,22 @@ use std::path::PathBuf;
 use glam::{Vec2, Vec3};
 use ndfmap_core::surface::SurfaceRow;
 use ndfmap_maps::MapError;
-use ndfmap_maps::model::{ModelOptions, read_model};
+use ndfmap_maps::model::{ModelOptions, model_of_bytes, read_model};
 use ndfmap_scene::{Object, Scene, SceneOptions};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use serde_json::{Value, json};
+
+fn case(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name)
+}
+
+fn options() -> ModelOptions {
+    ModelOptions { staging: SceneOptions::default(), material: None }
+}
 
 fn read(name: &str) -> Result<(Scene, Vec<String>), MapError> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name);
-    read_model(&path, &ModelOptions { staging: SceneOptions::default(), material: None })
+    read_model(&case(name), &options())
 }
 
 /// The object under a place of the square from -1 to 1, its map coordinates and its normal there.
@@ -137,6 +147,7 @@ fn the_whole_square_is_there() {
         "b39_latin1.ply",
         "b40_strip.gltf",
         "b41_quantised.gltf",
+        "b47_meshopt.gltf",
     ] {
         let (scene, _) = read(name).unwrap_or_else(|e| panic!("{e}"));
         let triangle = |object: &Object, t: &[u32; 3]| {
@@ -180,5 +191,122 @@ fn refusals_name_their_reason_first() {
         let error = read(name).err().unwrap().to_string();
         let after = error.split(": ").nth(1).unwrap();
         assert!(after.starts_with(reason), "{error}");
+    }
+}
+
+#[test]
+fn compressed_models_are_what_another_decoder_makes_of_them() {
+    for (name, plain) in [
+        ("b48_meshopt_cc.glb", "b48_meshopt_cc_plain.gltf"),
+        ("b49_meshopt_khr.glb", "b49_meshopt_khr_plain.gltf"),
+    ] {
+        let ((scene, warnings), (expected, _)) = (read(name).unwrap(), read(plain).unwrap());
+        assert_eq!(warnings, [] as [&str; 0], "{name}");
+        assert_eq!((scene.objects.len(), expected.objects.len()), (1, 1), "{name}");
+        let [mesh, right] = [&scene, &expected].map(|scene| &scene.objects[0].mesh);
+        assert_eq!((mesh.triangles.len(), mesh.vertices.len()), (162, 100), "{name}");
+        assert_eq!(mesh.triangles, right.triangles, "{name}");
+        let mut most = 0.0_f32;
+        for (vertex, right) in mesh.vertices.iter().zip(&right.vertices) {
+            assert_eq!((vertex.position, vertex.uv), (right.position, right.uv), "{name}");
+            most = most.max(vertex.normal.distance(right.normal));
+        }
+        println!("{name}: {most}");
+        assert!(most < 1e-6, "{name}: {most}");
+        for at in CORNERS {
+            assert_eq!(diffuse(&scene, at), diffuse(&expected, at), "{name}");
+        }
+    }
+}
+
+#[test]
+fn compressed_views_that_contradict_themselves_are_refused() {
+    let name = "b47_meshopt.gltf";
+    let refused = |change: &dyn Fn(&mut Value)| {
+        let mut json: Value = serde_json::from_slice(&std::fs::read(case(name)).unwrap()).unwrap();
+        change(&mut json);
+        let read = model_of_bytes(&case(name), json.to_string().as_bytes(), &options());
+        read.err().map(|e| e.to_string()).unwrap_or_default()
+    };
+    assert_eq!(refused(&|_| ()), "");
+    let set = |key: &str, value: Value| {
+        refused(&|json| {
+            let view = &mut json["bufferViews"][2]["extensions"]["EXT_meshopt_compression"];
+            view[key] = value.clone();
+        })
+    };
+    for (key, value, reason) in [
+        ("count", json!(26), "contradicts itself"),
+        ("count", json!(-1), "has a damaged compressed view"),
+        ("count", json!(1_u64 << 63), "contradicts itself"),
+        ("byteStride", json!(4), "contradicts itself"),
+        ("buffer", json!(2), "contradicts itself"),
+        ("byteLength", json!(90), "ends too early"),
+        ("byteLength", json!(111), "has bytes left over"),
+        ("byteOffset", json!(161), "is of another mode"),
+        ("byteOffset", json!(u64::MAX), "outside its buffer"),
+        ("mode", json!("TRIANGLES"), "does not allow"),
+        ("mode", json!("POINTS"), "unknown variant `POINTS`"),
+        ("filter", json!("WAVELET"), "unknown variant `WAVELET`"),
+    ] {
+        let error = set(key, value.clone());
+        assert!(error.contains(reason), "{key} {value}: {error}");
+    }
+}
+
+#[test]
+fn views_that_share_their_bytes_decode_to_no_more_than_the_file_can_hold() {
+    use base64::Engine;
+    // 4096 blocks of zeros, a kilobyte each from one byte; one view is within bounds, two are not.
+    let stream = [&[0xA1], [0xAA; 4096].as_slice(), &[0; 24]].concat();
+    let view = |buffer: usize| {
+        json!({ "buffer": buffer, "byteLength": 1 << 22, "extensions": {
+            "KHR_meshopt_compression": {
+                "buffer": 0, "byteLength": stream.len(), "byteStride": 4, "mode": "ATTRIBUTES", "count": 1 << 20
+            }
+        } })
+    };
+    let data = base64::engine::general_purpose::STANDARD.encode(&stream);
+    for (views, reason) in [(1, "holds no triangles"), (2, "decompresses to more than")] {
+        let json = json!({
+            "asset": { "version": "2.0" },
+            "extensionsRequired": ["KHR_meshopt_compression"],
+            "buffers": [
+                { "byteLength": stream.len(), "uri": format!("data:application/octet-stream;base64,{data}") },
+                { "byteLength": 1 << 23 }
+            ],
+            "bufferViews": (0..views).map(|_| view(1)).collect::<Vec<_>>(),
+        });
+        let error = model_of_bytes("a.gltf".as_ref(), json.to_string().as_bytes(), &options());
+        let error = error.err().unwrap().to_string();
+        assert!(error.contains(reason), "{error}");
+    }
+}
+
+#[test]
+fn damaged_compressed_models_are_errors_or_models() {
+    let mut random = Pcg64Mcg::seed_from_u64(1);
+    for name in ["b47_meshopt.gltf", "b48_meshopt_cc.glb", "b49_meshopt_khr.glb"] {
+        let bytes = std::fs::read(case(name)).unwrap();
+        let read = |bytes: &[u8]| model_of_bytes(&case(name), bytes, &options());
+        for end in (0..bytes.len()).step_by(37) {
+            assert!(read(&bytes[..end]).is_err(), "{name}: {end}");
+        }
+        // The bytes of a binary file behind its JSON, whose damage is none of the decoders'.
+        let binary = bytes.windows(4).position(|four| four == b"BIN\0").map_or(0, |at| at + 4);
+        let mut refused = 0;
+        for _ in 0..300 {
+            let mut copy = bytes.clone();
+            for _ in 0..random.random_range(1..4) {
+                let at = random.random_range(binary..copy.len());
+                copy[at] ^= 1 << random.random_range(0..8);
+            }
+            let error = read(&copy).err().map(|e| e.to_string()).unwrap_or_default();
+            refused += usize::from(!error.is_empty());
+            // That is what is said of panics.
+            assert!(binary == 0 || !error.contains("in a way that"), "{name}: {error}");
+        }
+        println!("{name}: {refused}");
+        assert!((50..300).contains(&refused), "{name}: {refused}");
     }
 }

@@ -7,10 +7,11 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 
+use super::meshopt::{self, Packed};
 use crate::MapError;
 use crate::formats::read_file;
 
-/// Extensions that a file may require.
+/// Extensions that a file may require, besides [`meshopt::NAMES`].
 const READ_EXTENSIONS: [&str; 6] = [
     "KHR_texture_transform",
     "KHR_lights_punctual",
@@ -56,17 +57,20 @@ pub(super) fn open<'a>(path: &'a Path, bytes: &'a [u8]) -> Result<Opened<'a>, Ma
     let mut json: Value = serde_json::from_slice(&json).map_err(|e| invalid(&e))?;
     refuse_unread(path, &json)?;
     rewrite(&mut json);
+    let packed = Packed::of(path, &mut json)?;
     let json: gltf::json::Root = serde_json::from_value(json).map_err(|e| invalid(&e))?;
     let document = gltf::Document::from_json(json).map_err(|e| invalid(&e))?;
     let mut buffers = Vec::new();
-    for buffer in document.buffers() {
+    for buffer in document.buffers().take(packed.own) {
         buffers.push(match buffer.source() {
+            _ if !packed.reads(buffer.index()) => Cow::Borrowed([].as_slice()),
             gltf::buffer::Source::Uri(uri) => Cow::Owned(resource(path, uri)?.bytes),
             gltf::buffer::Source::Bin => {
                 blob.clone().ok_or_else(|| MapError::invalid(path, "lacks its binary chunk"))?
             }
         });
     }
+    packed.unpack(path, &mut buffers)?;
     Ok(Opened { path, document, buffers })
 }
 
@@ -81,7 +85,7 @@ fn refuse_unread(path: &Path, json: &Value) -> Result<(), MapError> {
     }
     let required = json.get("extensionsRequired").and_then(Value::as_array);
     for name in required.into_iter().flatten().filter_map(Value::as_str) {
-        if !READ_EXTENSIONS.contains(&name) {
+        if !READ_EXTENSIONS.contains(&name) && !meshopt::NAMES.contains(&name) {
             return Err(MapError::unsupported(
                 path,
                 format!("requires {name}, which is not read: export it without"),
