@@ -200,6 +200,13 @@ fn layers_to_choose_from_are_listed() {
     let names = ["Combined.R", "Combined.G", "Combined.B", "Normal.X", "Normal.Y", "Normal.Z"];
     let error = read_image(Path::new("a.exr"), &exr_of(&names.map(str::to_owned))).err().unwrap().to_string();
     assert!(error.contains("several layers") && error.contains("Normal.Z"), "{error}");
+    // Each can be named: a layer, and a channel alone, as heights.
+    let bytes = exr_of(&names.map(str::to_owned));
+    let layer = |layer: &str| ndfmap_maps::formats::read_image_layer(Path::new("a.exr"), &bytes, layer);
+    assert_eq!(layer("Normal").unwrap().channels, 3);
+    assert_eq!(layer("Normal.Z").unwrap().channels, 1);
+    let error = layer("Depth").err().unwrap().to_string();
+    assert!(error.contains("no layer, part or channel `Depth`. Channels: Combined."), "{error}");
     let many: Vec<String> = (0..2000).map(|i| format!("layer{i}.X")).collect();
     let error = read_image(Path::new("a.exr"), &exr_of(&many)).err().unwrap().to_string();
     assert!(error.contains("2000 channels"), "{error}");

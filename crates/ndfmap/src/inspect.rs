@@ -2,14 +2,18 @@
 
 use std::path::Path;
 
+use glam::{DVec2, DVec3};
+use ndfmap_core::grid::Size;
 use ndfmap_core::ndf::{Decoded, NormalLobe};
-use ndfmap_core::surface::{SurfaceRow, integrability, slope_of_normal};
-use ndfmap_maps::formats::{read_file, read_image};
+use ndfmap_core::surface::{Surface, SurfaceRow, integrability, slope_of_normal};
+use ndfmap_maps::formats::{read_file, read_image, read_image_layer};
+use ndfmap_maps::model::{ModelOptions, read_model};
 use ndfmap_maps::source::{
     BUILTIN_PREFIX, Convention, DEFAULT_HEIGHT_SCALE, NormalLayout, PictureKind, SourceMap, SourceOptions,
     identify, read_source, source_of_image,
 };
 use ndfmap_maps::{Header, MapError, NdfMap, Source, SourceKind};
+use ndfmap_scene::{Material, MaterialMap, Mesh, SceneOptions};
 use serde::{Serialize, Serializer};
 
 use crate::Error;
@@ -75,6 +79,64 @@ pub struct SurfaceReport {
     /// Measure of how well the slopes are the gradient of some height: 1 for a perfect gradient, near 0 when
     /// nothing can be said, negative when y points the other way.
     pub integrability: f64,
+}
+
+/// Description of a model.
+#[derive(Clone, Debug, Serialize)]
+pub struct ModelReport {
+    /// `model`.
+    pub kind: &'static str,
+    /// Meshes, a material each.
+    pub meshes: usize,
+    /// Vertices of all meshes.
+    pub vertices: usize,
+    /// Triangles of all meshes.
+    pub triangles: usize,
+    /// Materials that meshes have.
+    pub materials: Vec<MaterialReport>,
+    /// Warnings of its reader.
+    pub warnings: Vec<String>,
+}
+
+/// Description of a material.
+#[derive(Clone, Debug, Serialize)]
+pub struct MaterialReport {
+    /// Name.
+    pub name: String,
+    /// Texels in a row of its map; 1 where it has none.
+    pub width: usize,
+    /// Rows of its map.
+    pub height: usize,
+    /// Variance of the slopes of its normals, along x and along y; 0 for a flat map.
+    pub slope_variance: [f64; 2],
+}
+
+/// Describes a model.
+///
+/// # Errors
+/// [`Error::Map`] when it cannot be read.
+pub fn describe_model(path: &Path) -> Result<ModelReport, Error> {
+    let options = ModelOptions { staging: SceneOptions::default(), material: None };
+    let (scene, warnings) = read_model(path, &options)?;
+    let used = |(at, _): &(usize, &Material)| scene.objects.iter().any(|object| object.material == *at);
+    let material = |(_, material): (usize, &Material)| {
+        let size = material.map.size();
+        let slope_variance = match &material.map {
+            MaterialMap::Surface(surface) => SlopeStatistics::of(&**surface).variance(),
+            MaterialMap::Baked(_) => [0.0; 2],
+        };
+        let Size { width, height } = size;
+        MaterialReport { name: material.name.clone(), width, height, slope_variance }
+    };
+    let count = |of: fn(&Mesh) -> usize| scene.objects.iter().map(|object| of(&object.mesh)).sum();
+    Ok(ModelReport {
+        kind: "model",
+        meshes: scene.objects.len(),
+        vertices: count(|mesh| mesh.vertices.len()),
+        triangles: count(|mesh| mesh.triangles.len()),
+        materials: scene.materials.iter().enumerate().filter(used).map(material).collect(),
+        warnings,
+    })
 }
 
 /// Texel of a baked map, decoded.
@@ -179,7 +241,7 @@ const MOST_KAPPA: f64 = 1e6;
 /// Describes a baked map.
 #[must_use]
 pub fn describe_map(map: &NdfMap) -> MapReport {
-    let size = |s: &ndfmap_core::grid::Size| LevelSize { width: s.width, height: s.height };
+    let size = |s: &Size| LevelSize { width: s.width, height: s.height };
     MapReport {
         header: map.header.clone(),
         layers: map.pyramid.layers(),
@@ -196,7 +258,11 @@ pub fn describe_picture(path: &Path, options: &SourceOptions) -> Result<PictureR
     if path.to_str().is_some_and(|name| name.starts_with(BUILTIN_PREFIX)) {
         return Ok(describe_builtin(&read_source(path, options)?));
     }
-    let image = read_image(path, &read_file(path)?)?;
+    let bytes = read_file(path)?;
+    let image = match &options.layer {
+        Some(layer) => read_image_layer(path, &bytes, layer)?,
+        None => read_image(path, &bytes)?,
+    };
     let identity = identify(path, &image);
     let samples = (0..image.samples.len()).map(|i| image.samples.get(i)).filter(|v| v.is_finite());
     let range = samples.fold([f32::MAX, f32::MIN], |[low, high], v| [low.min(v), high.max(v)]);
@@ -226,7 +292,7 @@ pub fn describe_picture(path: &Path, options: &SourceOptions) -> Result<PictureR
             .height_scale
             .or(Some(DEFAULT_HEIGHT_SCALE))
             .filter(|_| kind == SourceKind::Height),
-        ..*options
+        ..options.clone()
     };
     let mut map = source_of_image(path, image.clone(), String::new(), &told)?;
     if let Some(evidence) = map.convention {
@@ -264,26 +330,43 @@ fn describe_builtin(map: &SourceMap) -> PictureReport {
 }
 
 fn describe_surface(map: &SourceMap) -> SurfaceReport {
-    let size = map.surface.size();
-    let (mut mean, mut slopes) = (glam::DVec3::ZERO, [0.0_f64; 4]);
-    let mut row = SurfaceRow::flat(size.width);
-    for y in 0..size.height {
-        map.surface.read_row(y, &mut row);
-        for x in 0..size.width {
-            let (n, s) = (row.normal(x), slope_of_normal(row.normal(x)).as_dvec2());
-            mean += n.as_dvec3();
-            for (sum, v) in slopes.iter_mut().zip([s.x, s.y, s.x * s.x, s.y * s.y]) {
-                *sum += v;
-            }
-        }
-    }
-    let texels = size.area() as f64;
-    let [x, y, xx, yy] = slopes.map(|s| s / texels);
+    let statistics = SlopeStatistics::of(&*map.surface);
     SurfaceReport {
         source: map.source.clone(),
-        mean_normal_length: (mean / texels).length(),
-        slope_variance: [xx - x * x, yy - y * y],
+        mean_normal_length: statistics.mean_normal.length(),
+        slope_variance: statistics.variance(),
         integrability: integrability(&*map.surface),
+    }
+}
+
+/// Means over a surface's texels.
+struct SlopeStatistics {
+    mean_normal: DVec3,
+    mean_slope: DVec2,
+    mean_square: DVec2,
+}
+
+impl SlopeStatistics {
+    fn of(surface: &dyn Surface) -> Self {
+        let size = surface.size();
+        let (mut normal, mut slope, mut square) = (DVec3::ZERO, DVec2::ZERO, DVec2::ZERO);
+        let mut row = SurfaceRow::flat(size.width);
+        for y in 0..size.height {
+            surface.read_row(y, &mut row);
+            for x in 0..size.width {
+                let s = slope_of_normal(row.normal(x)).as_dvec2();
+                normal += row.normal(x).as_dvec3();
+                slope += s;
+                square += s * s;
+            }
+        }
+        let texels = size.area() as f64;
+        Self { mean_normal: normal / texels, mean_slope: slope / texels, mean_square: square / texels }
+    }
+
+    /// Variance of the slopes along x and along y.
+    fn variance(&self) -> [f64; 2] {
+        (self.mean_square - self.mean_slope * self.mean_slope).to_array()
     }
 }
 

@@ -7,12 +7,10 @@ use std::path::PathBuf;
 
 use ndfmap::core::bake::Bake;
 use ndfmap::core::brdf::AnyLobe;
-use ndfmap::core::grid::Size;
 use ndfmap::core::measure::TexelTruth;
 use ndfmap::core::ndf::AnyMethod;
 use ndfmap::core::sphere::DiskLattice;
-use ndfmap::core::surface::{SlopeFilter, Wraps};
-use ndfmap::maps::source::{Convention, DEFAULT_HEIGHT_SCALE, SourceOptions, read_source};
+use ndfmap::maps::source::{SourceOptions, read_source};
 use rayon::prelude::*;
 
 /// From matte to shiny.
@@ -37,16 +35,7 @@ const STEP: usize = 3;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let map = std::env::args().nth(1).map_or_else(|| PathBuf::from("builtin:foil"), PathBuf::from);
-    let options = SourceOptions {
-        kind: None,
-        convention: Some(Convention::OpenGl),
-        height_scale: Some(DEFAULT_HEIGHT_SCALE),
-        invert: false,
-        slope_filter: SlopeFilter::CentralDifference,
-        wraps: Wraps::default(),
-        builtin_size: Size::new(512, 512)?,
-    };
-    let source = read_source(&map, &options)?;
+    let source = read_source(&map, &SourceOptions::default())?;
     let lattice = DiskLattice::new(64, 0.97);
     let methods = ["toksvig", "sh:7", "sh:16", "vmf:4", "vmf:6"]
         .map(|m| m.parse::<AnyMethod>().map_err(|e| e.to_string()));

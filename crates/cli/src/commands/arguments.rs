@@ -28,6 +28,9 @@ use crate::voice::{detail, say, warn};
 /// Reading of the source map.
 #[derive(Debug, Args)]
 pub(super) struct SourceArguments {
+    /// Layer, part or channel of an OpenEXR file that has several
+    #[arg(long, value_name = "NAME")]
+    layer: Option<String>,
     /// Take the map as normals or as heights [default: by what it looks like]
     #[arg(long, value_enum, ignore_case = true)]
     from: Option<From>,
@@ -159,6 +162,7 @@ impl SourceArguments {
 
     fn options(&self, builtin_size: Size) -> SourceOptions {
         SourceOptions {
+            layer: self.layer.clone(),
             kind: self.from.map(|from| match from {
                 From::Normal => SourceKind::Normal,
                 From::Height => SourceKind::Height,

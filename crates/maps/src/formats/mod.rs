@@ -216,6 +216,17 @@ pub fn read_ndf(path: &Path, bytes: &[u8]) -> Result<Option<NdfMap>, MapError> {
     }
 }
 
+/// Reads the picture of a layer, of a part, or of one channel, by its name; only OpenEXR has such.
+///
+/// # Errors
+/// [`MapError`], as of a picture, and where there is no such layer.
+pub fn read_image_layer(path: &Path, bytes: &[u8], layer: &str) -> Result<Image, MapError> {
+    if detect(path, bytes)?.name != exr::FORMAT.name {
+        return Err(MapError::unsupported(path, "has no layers: they are OpenEXR's"));
+    }
+    exr::read_layer(path, bytes, Some(layer))
+}
+
 /// Reads a picture.
 ///
 /// # Errors

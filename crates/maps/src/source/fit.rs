@@ -42,8 +42,12 @@ pub fn fit_height_scale(
 ) -> Result<HeightFit, MapError> {
     let image = read_image(heights, &read_file(heights)?)?;
     let field = gentle_heights(heights, &image, options)?;
-    let normal_options =
-        SourceOptions { kind: Some(SourceKind::Normal), height_scale: None, invert: false, ..*options };
+    let normal_options = SourceOptions {
+        kind: Some(SourceKind::Normal),
+        height_scale: None,
+        invert: false,
+        ..options.clone()
+    };
     let normals_map = read_source(normals, &normal_options)?.surface;
     let [h, n] = [field.heights.size(), normals_map.size()];
     if h.width * n.height != h.height * n.width {

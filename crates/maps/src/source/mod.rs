@@ -20,7 +20,7 @@ pub use self::normals::ConventionEvidence;
 
 use self::heights::height_field;
 use self::normals::EncodedNormals;
-use crate::formats::{read_file, read_image};
+use crate::formats::{read_file, read_image, read_image_layer};
 use crate::header::{Source, SourceKind};
 use crate::{Image, MapError};
 
@@ -36,8 +36,10 @@ pub enum Convention {
 words!(Convention { OpenGl => "opengl", DirectX => "directx" });
 
 /// Options for reading a picture as a surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SourceOptions {
+    /// Name of the layer, part or channel to read, of an OpenEXR file that has several.
+    pub layer: Option<String>,
     /// Kind of the map, normals or heights; `None` decides by [`identify`].
     pub kind: Option<SourceKind>,
     /// Direction of green, for normal maps; `None` decides by [`ConventionEvidence`].
@@ -61,6 +63,7 @@ pub const DEFAULT_HEIGHT_SCALE: f64 = 0.05;
 impl Default for SourceOptions {
     fn default() -> Self {
         Self {
+            layer: None,
             kind: None,
             convention: None,
             height_scale: None,
@@ -104,7 +107,10 @@ pub fn read_source(map: &Path, options: &SourceOptions) -> Result<SourceMap, Map
 /// # Errors
 /// [`MapError`], as for a file.
 pub fn source_of_bytes(map: &Path, bytes: &[u8], options: &SourceOptions) -> Result<SourceMap, MapError> {
-    let image = read_image(map, bytes)?;
+    let image = match &options.layer {
+        Some(layer) => read_image_layer(map, bytes, layer)?,
+        None => read_image(map, bytes)?,
+    };
     let sha256 = Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect();
     source_of_image(map, image, sha256, options)
 }
@@ -139,7 +145,7 @@ fn builtin(map: &Path, name: &str, options: &SourceOptions) -> Result<SourceMap,
     Ok(SourceMap { surface: surface.into(), source, convention: None, warnings })
 }
 
-/// Reads a decoded picture as a surface.
+/// Reads a decoded picture as a surface; the layer has been chosen.
 ///
 /// # Errors
 /// [`MapError`] for a picture that does not fit the options, and where they leave open what it does not tell:

@@ -5,6 +5,8 @@
 //! `maketx --bumpslopes` writes them: slopes of a height map per texel in the file's own units with t
 //! down the image, slopes of a normal map as `-n.xy / n.z` of the vectors as stored, and `b0_h` = -1.
 
+mod choice;
+
 use std::io::{Cursor, Write};
 use std::path::Path;
 
@@ -22,6 +24,7 @@ use ndfmap_core::ndf::Encoding as Channels;
 use ndfmap_core::pyramid::{Precision, Pyramid, level_sizes};
 use ndfmap_scene::metrics::Picture;
 
+use self::choice::{PartChannels, channel_names, choose_channels, layer_and_name};
 use super::{ChannelLayout, EncodedPicture, Format, WriteOptions, WritePicture, decoded};
 use crate::atomic::AtomicFile;
 use crate::header::{Source, SourceKind, VERSION};
@@ -100,6 +103,10 @@ fn has_bumpslopes(meta: &MetaData) -> bool {
     BUMPSLOPES.iter().all(|name| channels.iter().any(|c| c.name.eq_case_insensitive(name)))
 }
 
+/// Largest frame that a crop of any size may lie in, in texels; larger ones are at most sixteen times the
+/// crop.
+const LARGE_FRAME: usize = 1 << 24;
+
 /// True for a file that says of itself that it is a cube of an environment, by OpenEXR's definition.
 pub(crate) fn is_cube(path: &Path, bytes: &[u8]) -> bool {
     let says_cube =
@@ -108,6 +115,11 @@ pub(crate) fn is_cube(path: &Path, bytes: &[u8]) -> bool {
 }
 
 fn read_image(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
+    read_layer(path, bytes, None)
+}
+
+/// Reads a picture: that of the layer or part of this name, else the only one there is.
+pub(super) fn read_layer(path: &Path, bytes: &[u8], layer: Option<&str>) -> Result<Image, MapError> {
     check_header(path, bytes)?;
     let meta = metadata(path, bytes)?;
     if header_text(&meta).is_some() || has_bumpslopes(&meta) {
@@ -120,8 +132,26 @@ fn read_image(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
         let reader = read().no_deep_data().largest_resolution_level().all_channels();
         reader.all_layers().all_attributes().from_buffered(Cursor::new(bytes))
     })?;
-    let parts: Vec<&[AnyChannel<FlatSamples>]> =
-        image.layer_data.iter().map(|part| &part.channel_data.list[..]).collect();
+    let mut parts: Vec<PartChannels<'_>> =
+        image.layer_data.iter().map(|part| part.channel_data.list.iter().collect()).collect();
+    if let Some(layer) = layer {
+        let whole = |part: usize| {
+            image.layer_data[part]
+                .attributes
+                .layer_name
+                .as_ref()
+                .is_some_and(|name| name.to_string() == layer)
+        };
+        let all = channel_names(&parts);
+        for (_, channels) in parts.iter_mut().enumerate().filter(|(part, _)| !whole(*part)) {
+            channels
+                .retain(|channel| layer_and_name(channel).0 == layer || channel.name.to_string() == layer);
+        }
+        if parts.iter().all(Vec::is_empty) {
+            let reason = format!("has no layer, part or channel `{layer}`. Channels: {all}");
+            return Err(MapError::unsupported(path, reason));
+        }
+    }
     let choice = choose_channels(path, &parts)?;
     let part = &image.layer_data[choice.part];
     let size = check_size(path, part.size.width(), part.size.height())?;
@@ -160,97 +190,6 @@ fn read_image(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
     }
     picture.warnings.extend(choice.warning);
     Ok(picture)
-}
-
-/// Channels of one layer that make up a picture.
-struct Choice<'a> {
-    part: usize,
-    channels: Vec<&'a AnyChannel<FlatSamples>>,
-    /// Name of the layer, where the file has no plain channels.
-    warning: Option<String>,
-}
-
-/// Most channels that a picture is looked for in.
-const MOST_CHANNELS: usize = 1024;
-
-/// Largest frame that a crop of any size may lie in, in texels; larger ones are at most sixteen times the
-/// crop.
-const LARGE_FRAME: usize = 1 << 24;
-
-/// Names of a picture's channels, in the order in which they are looked for: colours, then vectors.
-const COLOURS_AND_VECTORS: [&[&str]; 4] =
-    [&["R", "G", "B"], &["X", "Y", "Z"], &["NX", "NY", "NZ"], &["RED", "GREEN", "BLUE"]];
-
-/// Chooses the channels of a picture: the plain ones of the first part (R, G, B; X, Y, Z; ...), else those of
-/// the only layer that has such a set, else R and G, else the only channel that is no alpha.
-///
-/// # Errors
-/// [`MapError`] that lists the channels, where there are several layers to choose from.
-fn choose_channels<'a>(path: &Path, parts: &[&'a [AnyChannel<FlatSamples>]]) -> Result<Choice<'a>, MapError> {
-    let count: usize = parts.iter().map(|channels| channels.len()).sum();
-    if count > MOST_CHANNELS {
-        let reason = format!("has {count} channels; at most {MOST_CHANNELS} are read");
-        return Err(MapError::unsupported(path, reason));
-    }
-    let mut layers: Vec<(usize, String)> = Vec::new();
-    for (part, channels) in parts.iter().enumerate() {
-        for channel in channels.iter() {
-            let layer = (part, layer_and_name(channel).0);
-            if !layers.contains(&layer) {
-                layers.push(layer);
-            }
-        }
-    }
-    let set = |(part, layer): &(usize, String), names: &[&str]| -> Option<Vec<&'a AnyChannel<FlatSamples>>> {
-        let find = |name: &&str| {
-            parts[*part].iter().find(|c| layer_and_name(c) == (layer.clone(), (*name).to_owned()))
-        };
-        names.iter().map(find).collect()
-    };
-    let triple = |layer: &(usize, String)| COLOURS_AND_VECTORS.iter().find_map(|names| set(layer, names));
-    let plain = (0, String::new());
-    if let Some(channels) = triple(&plain) {
-        return Ok(Choice { part: 0, channels, warning: None });
-    }
-    let mut found: Vec<_> = layers.iter().filter_map(|layer| Some((layer, triple(layer)?))).collect();
-    if let (Some(channels), true) = (set(&plain, &["R", "G"]), found.is_empty()) {
-        return Ok(Choice { part: 0, channels, warning: None });
-    }
-    if found.is_empty() {
-        let alpha = |c: &AnyChannel<FlatSamples>| matches!(layer_and_name(c).1.as_str(), "A" | "ALPHA");
-        for layer in &layers {
-            let single = parts[layer.0].iter().filter(|c| layer_and_name(c).0 == layer.1 && !alpha(c));
-            found.extend(single.map(|c| (layer, vec![c])));
-        }
-    }
-    let names = || {
-        let all = parts.iter().flat_map(|channels| channels.iter().map(|c| c.name.to_string()));
-        all.collect::<Vec<_>>().join(", ")
-    };
-    match &found[..] {
-        [(layer, channels)] => {
-            let named = !layer.1.is_empty() || layer.0 > 0;
-            let warning = named.then(|| {
-                let taken: Vec<String> = channels.iter().map(|c| c.name.to_string()).collect();
-                format!("has layers: {} are taken", taken.join(", "))
-            });
-            Ok(Choice { part: layer.0, channels: channels.clone(), warning })
-        }
-        [] => Err(MapError::unsupported(path, format!("has no channels of a picture, only {}", names()))),
-        _ => {
-            let reason = format!("has several layers; save the one to read alone. Channels: {}", names());
-            Err(MapError::unsupported(path, reason))
-        }
-    }
-}
-
-/// Layer and name of a channel, `Layer.Name`, the name in capitals.
-fn layer_and_name(channel: &AnyChannel<FlatSamples>) -> (String, String) {
-    let name = channel.name.to_string();
-    match name.rsplit_once('.') {
-        Some((layer, name)) => (layer.to_owned(), name.to_uppercase()),
-        None => (String::new(), name.to_uppercase()),
-    }
 }
 
 fn read_ndf(path: &Path, bytes: &[u8]) -> Result<Option<NdfMap>, MapError> {
