@@ -6,7 +6,7 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
-use common::{data, json, ndfmap};
+use common::{data, json, ndfmap, outcome, text};
 use ndfmap::maps::formats::read_image;
 use serde_json::Value;
 
@@ -108,7 +108,7 @@ fn heights_take_the_scale_of_the_normal_map_beside_them() {
         let own = variance(&text(&data.join("height").join(height)), &["--height-scale", &scale]);
         let due = variance(&text(&data.join("normal").join(normal)), &[]);
         assert!((own / due).ln().abs() < 0.5, "{height} {own} {due}");
-        assert_eq!(baked["method"], "slopes");
+        assert_eq!(baked["method"], "vmf:2");
     }
     let (status, _, said) = bake("godot_wool_depth.png", "ambientcg_Rock058_normal.jpg");
     assert!(status == 1 && said.contains("do not show one surface"), "{said}");

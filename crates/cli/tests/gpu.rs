@@ -80,7 +80,7 @@ fn the_gpu_draws_the_film_that_the_cpu_draws() {
 #[test]
 fn a_baked_map_is_rendered_as_it_is() {
     let folder = tempfile::tempdir().unwrap();
-    json(folder.path(), "bake builtin:foil --size 64 --method gmm:2 -o foil.ktx2");
+    json(folder.path(), "bake builtin:foil --map-size 64 --method gmm:2 -o foil.ktx2");
     let shared = "render --scene plane --size 64 --device cpu";
     let own = json(folder.path(), &format!("{shared} --map foil.ktx2 -o baked.png"));
     assert_eq!(own["method"], "gmm:2");

@@ -1,8 +1,9 @@
 //! Environments: pictures of light from everywhere, by latitude and longitude or on the faces of a cube.
 //!
-//! Faces of cubes are seen from inside, as OpenGL and Direct3D define them: in a world whose z runs ahead while
-//! x runs to the right, the mirror image of ours. Ours has the same z, and x the other way. OpenEXR defines its
-//! cubes in a world like ours (ImfEnvmap.h, "Cube map"), whose panoramas look to +z where ours look to -z.
+//! Faces of cubes are seen from inside, as OpenGL and Direct3D define them: in a world whose z runs ahead
+//! while x runs to the right, the mirror image of ours. Ours has the same z, and x the other way. OpenEXR
+//! defines its cubes in a world like ours (ImfEnvmap.h, "Cube map"), whose panoramas look to +z where ours
+//! look to -z.
 
 use std::path::Path;
 
@@ -198,7 +199,8 @@ mod tests {
 
     #[test]
     fn crosses_and_strips_are_seen_from_inside() {
-        // Ahead, right and up of each face in a world whose z runs ahead and x to the right, as seen on a cross.
+        // Ahead, right and up of each face in a world whose z runs ahead and x to the right, as seen on a
+        // cross.
         let axes = [
             [DVec3::X, DVec3::NEG_Z, DVec3::Y],
             [DVec3::NEG_X, DVec3::Z, DVec3::Y],

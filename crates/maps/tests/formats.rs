@@ -48,7 +48,8 @@ fn every_picture_format_gives_the_same_normals() {
         let map = source(name, &bytes, &green_up());
         assert_eq!(map.source.kind, SourceKind::Normal, "{name}");
         assert_eq!(map.surface.size(), Size { width: WIDTH, height: HEIGHT });
-        // JPEG and UASTC lose; RGBE cuts to 8 bits under a shared exponent, 2/256 a channel; all else is exact.
+        // JPEG and UASTC lose; RGBE cuts to 8 bits under a shared exponent, 2/256 a channel; all else is
+        // exact.
         let tolerance = match name {
             "map.jpg" => 0.25,
             "map.hdr" => 0.015,

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use ndfmap::choose::{Auto, Choice, Limit};
-use ndfmap::core::ndf::{AnyMethod, Encoding};
+use ndfmap::core::ndf::{AnyMethod, DEFAULT_METHOD, Encoding};
 use ndfmap::core::observe::{Observer, Unobserved};
 use ndfmap::maps::attribute::{AttributeMap, Transfer, read_attribute};
 use ndfmap::maps::formats::{is_picture, to_write};
@@ -43,9 +43,9 @@ pub(super) struct Bake {
     /// Folder to write into, a `.ktx2` (for bumpslopes, an `.exr`) for each map
     #[arg(long, value_name = "DIR")]
     output_dir: Option<PathBuf>,
-    /// Method that represents the normals; `--help` lists them. `auto` measures this map and chooses
-    #[arg(short, long, default_value = "slopes", value_parser = method_or_auto)]
-    method: String,
+    #[arg(short, long, value_parser = method_or_auto, help = format!("Method that represents the normals; `--help` \
+        lists them. `auto` measures this map and chooses [default: {DEFAULT_METHOD}; for bumpslopes, slopes]"))]
+    method: Option<String>,
     /// For `auto`: the cheapest method whose error is at most this
     #[arg(long, value_name = "E", value_parser = positive, conflicts_with = "bytes_per_texel")]
     max_error: Option<f64>,
@@ -128,12 +128,18 @@ struct Outcome {
 }
 
 impl Bake {
+    /// Spelling of the method.
+    fn method(&self) -> &str {
+        let usual = if self.layout == Layout::Bumpslopes { "slopes" } else { DEFAULT_METHOD };
+        self.method.as_deref().unwrap_or(usual)
+    }
+
     /// Refuses options that contradict each other, before anything is read.
     fn check(&self, outputs: &[Pair]) -> Result<(), Error> {
         let bumpslopes = self.layout == Layout::Bumpslopes;
         let limited = self.max_error.is_some() || self.bytes_per_texel.is_some();
         let slopes = |method: AnyMethod| method.encoding() == Encoding::SlopeMoments;
-        let slopes = self.method.parse().is_ok_and(slopes);
+        let slopes = self.method().parse().is_ok_and(slopes);
         let extension = |path: &Path| path.extension().map(|e| e.to_string_lossy().to_lowercase());
         for Pair { output, .. } in outputs.iter().filter(|pair| !is_standard(&pair.output)) {
             let extension = extension(output).unwrap_or_default();
@@ -150,11 +156,11 @@ impl Bake {
             };
             return Err(Error::Request(wrong));
         }
-        let wrong = if self.method == AUTO && !limited {
+        let wrong = if self.method() == AUTO && !limited {
             "`--method auto` needs `--max-error E` or `--bytes-per-texel B`".to_owned()
-        } else if self.method != AUTO && limited {
+        } else if self.method() != AUTO && limited {
             "`--max-error` and `--bytes-per-texel` are for `--method auto`".to_owned()
-        } else if self.method != AUTO && self.brdf.is_some() {
+        } else if self.method() != AUTO && self.brdf.is_some() {
             "`--brdf` is for `--method auto`: a bake knows no BRDF".to_owned()
         } else if self.attribute.len() > MAX_ATTRIBUTES {
             format!("at most {MAX_ATTRIBUTES} attributes are carried")
@@ -226,8 +232,8 @@ impl Bake {
 
     /// Method that was asked for, or is chosen by measuring.
     fn choose(&self, map: &SourceMap, observer: &dyn Observer) -> Result<(AnyMethod, Option<Choice>), Error> {
-        if self.method != AUTO {
-            return Ok((self.method.parse()?, None));
+        if self.method() != AUTO {
+            return Ok((self.method().parse()?, None));
         }
         let limit = match (self.max_error, self.bytes_per_texel) {
             (Some(error), _) => Limit::Error(error),

@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Args;
 use ndfmap::core::grid::Size;
 use ndfmap::core::lookup::{Filtering, Lookups};
-use ndfmap::core::ndf::{AnyMethod, Slopes};
+use ndfmap::core::ndf::{AnyMethod, DEFAULT_METHOD};
 use ndfmap::core::pyramid::Precision;
 use ndfmap::maps::source::{SourceOptions, read_source};
 use ndfmap::maps::{WriteOptions, atomic};
@@ -85,9 +85,11 @@ impl Demo {
             written.push(path);
         }
 
-        let path = self.output.join("foil.slopes.ktx2");
+        let path = self.output.join("foil.ktx2");
         make_way(&path)?;
-        BakeJob::new(&map, Slopes::new()).observer(&terminal).save(&path, &WriteOptions::default())?;
+        BakeJob::new(&map, DEFAULT_METHOD.parse::<AnyMethod>()?)
+            .observer(&terminal)
+            .save(&path, &WriteOptions::default())?;
         written.push(path);
 
         if json {

@@ -10,7 +10,7 @@ use ndfmap::core::brdf::ShadingModel;
 use ndfmap::core::grid::{Grid, Size};
 use ndfmap::core::light::Light;
 use ndfmap::core::lookup::{Filtering, Lookups, Sampling};
-use ndfmap::core::ndf::AnyMethod;
+use ndfmap::core::ndf::{AnyMethod, DEFAULT_METHOD};
 use ndfmap::core::observe::Observer;
 use ndfmap::maps::atomic;
 use ndfmap::maps::formats::{WritePicture, picture_writer};
@@ -45,14 +45,16 @@ pub(super) struct Render {
     /// A normal or height map, `builtin:NAME`, or a baked map, for the scene's first material
     #[arg(long)]
     map: Option<PathBuf>,
-    /// Material of a model that `--map`, `--diffuse` and `--specular` are for [default: that of its first mesh]
+    /// Material of a model that `--map`, `--diffuse` and `--specular` are for [default: that of its first
+    /// mesh]
     #[arg(long, value_name = "NAME")]
     material: Option<String>,
     /// The picture to write, by the first method: .png as shown, .exr in linear light; several frames are
     /// numbered
     #[arg(short, long, value_name = "FILE", required_unless_present_any = ["compare", "truth_output", "json"])]
     output: Option<PathBuf>,
-    #[arg(short, long, value_delimiter = ',', value_parser = method_spelling, help = "Methods, separated by commas [default: vmf:4; displaced, slopes; or a baked map's own]")]
+    #[arg(short, long, value_delimiter = ',', value_parser = method_spelling, help = format!("Methods, separated by commas \
+        [default: {DEFAULT_METHOD}; displaced, slopes; or a baked map's own]"))]
     method: Vec<String>,
     /// Render the truth too, with at most this many rays a pixel, and measure against it
     #[arg(long, value_name = "RAYS", num_args = 0..=1, require_equals = true, default_missing_value = "256",
@@ -328,7 +330,7 @@ impl Render {
         }
         check_apart(self.output.iter().chain(&self.truth_output).chain(&self.compare))?;
         let baked = self.read_baked()?;
-        let usual = if self.displace.displace.is_some() { "slopes" } else { "vmf:4" };
+        let usual = if self.displace.displace.is_some() { "slopes" } else { DEFAULT_METHOD };
         let own = baked.as_ref().map_or_else(|| usual.to_owned(), |map| map.method.to_string());
         let asked = if self.method.is_empty() { std::slice::from_ref(&own) } else { &self.method[..] };
         let mut methods: Vec<AnyMethod> = Vec::new();

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use clap::Args;
 use ndfmap::core::brdf::{Brdf, ShadingModel};
-use ndfmap::core::ndf::AnyMethod;
+use ndfmap::core::ndf::{AnyMethod, DEFAULT_METHOD};
 use ndfmap::gpu::export::{Export, Language, TABLE};
 use serde_json::json;
 
@@ -19,7 +19,7 @@ use ndfmap::Error;
 #[command(after_long_help = format!("{}\n\n{}\n\n{}", languages_help(), methods_help(), brdfs_help()))]
 pub(super) struct Shader {
     /// The method that the map is baked with
-    #[arg(short, long, default_value = "vmf:4", value_parser = method_spelling)]
+    #[arg(short, long, default_value = DEFAULT_METHOD, value_parser = method_spelling)]
     method: String,
     /// The reflectance lobe
     #[arg(long, default_value = "ggx:0.2", value_parser = brdf_spelling)]

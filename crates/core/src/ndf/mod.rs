@@ -47,7 +47,7 @@ pub use phong::{Phong, PhongPeaks};
 pub use reflect::{FilteredTexel, IncidentLight, PreparedBrdf};
 pub use sh::{Coefficients, Sh};
 pub use slopes::{SlopeGaussian, SlopeMoments, Slopes};
-pub use table::{ParameterError, ParseMethodError, Row, TABLE};
+pub use table::{DEFAULT_METHOD, ParameterError, ParseMethodError, Row, TABLE};
 pub use toksvig::{MeanLobe, Toksvig};
 pub use vmf::{Vmf, VmfMixture};
 

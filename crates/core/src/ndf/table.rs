@@ -27,6 +27,10 @@ pub struct Row {
 pub static TABLE: &[Row] =
     &[fixed::ROW, naive::ROW, toksvig::ROW, ndm::ROW, slopes::ROW, sh::ROW, vmf::ROW, gmm::ROW, phong::ROW];
 
+/// Method of every command, unless told otherwise: as many bytes as slopes take, three fifths of their error
+/// on real maps, at texels and between them (`docs/choose.md`).
+pub const DEFAULT_METHOD: &str = "vmf:2";
+
 /// Parameter of a method that is out of its range, or a word that it does not know.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]

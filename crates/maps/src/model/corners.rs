@@ -6,6 +6,7 @@
 use std::collections::HashMap;
 
 use glam::{Vec2, Vec3};
+#[cfg(any(feature = "obj", feature = "ply"))]
 use ndfmap_scene::area_normals;
 
 use super::RawMesh;
@@ -24,12 +25,14 @@ pub(super) struct CornerMesh {
 impl CornerMesh {
     /// Gives every corner the area-weighted normal of its position, so that seams of map coordinates are no
     /// creases.
+    #[cfg(any(feature = "obj", feature = "ply"))]
     pub(super) fn smooth(&mut self) {
         let normals = area_normals(&self.positions, &self.triangles);
         self.normals = self.triangles.iter().flatten().map(|i| normals[*i as usize]).collect();
     }
 
     /// Gives every corner the normal of its triangle.
+    #[cfg(feature = "gltf")]
     pub(super) fn flatten(&mut self) {
         let position = |i: u32| self.positions[i as usize];
         let normal = |t: &[u32; 3]| {
@@ -66,6 +69,7 @@ impl CornerMesh {
     }
 }
 
+#[cfg(feature = "gltf")]
 impl RawMesh {
     /// The same mesh, every triangle as flat as it lies.
     pub(super) fn faceted(self) -> Self {

@@ -4,6 +4,7 @@
 //! formats: normals (area-weighted), map coordinates (`unwrap.rs`), tangents (MikkTSpace), and a camera and
 //! two lights that suit the model's size.
 
+#[cfg(any(feature = "gltf", feature = "obj", feature = "ply"))]
 mod corners;
 #[cfg(feature = "gltf")]
 mod gltf;
@@ -235,6 +236,7 @@ fn microfacets(alpha: f64) -> Brdf {
 }
 
 /// Triangles of a strip of vertices, all of them turned alike.
+#[cfg(any(feature = "gltf", feature = "ply"))]
 fn strip(indices: &[u32]) -> Vec<[u32; 3]> {
     let turned = |(i, t): (usize, &[u32])| match i % 2 {
         0 => [t[0], t[1], t[2]],

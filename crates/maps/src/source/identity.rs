@@ -105,8 +105,8 @@ const UNIT_SHARE: f64 = 0.6;
 /// surface lean so far both ways at once. Maps have at most 0.06.
 const GREY: f64 = 0.3;
 
-/// Largest mean of x and of y where length does not tell, as blue is not z: detail leans nowhere. Maps have at
-/// most 0.06, colours and packed values 0.2 and more.
+/// Largest mean of x and of y where length does not tell, as blue is not z: detail leans nowhere. Maps have
+/// at most 0.06, colours and packed values 0.2 and more.
 const LEANING_XY: f64 = 0.1;
 
 /// Largest correlation of red with green where length does not tell. Colours have 0.79 and more.

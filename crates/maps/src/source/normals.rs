@@ -64,8 +64,8 @@ impl ConventionEvidence {
     /// Convention that the slopes tell; `None` where they are not clear.
     #[must_use]
     pub fn by_slopes(&self) -> Option<Convention> {
-        // Of slopes that have nothing to do with each other, the correlation's deviation is 1 over the root of
-        // their number: few texels tell less.
+        // Of slopes that have nothing to do with each other, the correlation's deviation is 1 over the root
+        // of their number: few texels tell less.
         let clear = CLEAR.max(SIGNIFICANT / (self.texels.max(1) as f64).sqrt());
         match self.integrability {
             i if i >= clear => Some(Convention::OpenGl),

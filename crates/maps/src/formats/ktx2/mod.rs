@@ -2,8 +2,8 @@
 //!
 //! A map is a 2-D array texture, one array layer per RGBA layer, full mip chain. The writer uses the `ktx2`
 //! crate's serialisers and takes rows while they are being baked, so a map need never be in memory whole.
-//! Zstandard needs a level in its order, layer by layer, where a bake makes all layers of a band at once: rows
-//! lie in a plain file without a name until they are compressed. `docs/formats.md` has the layout.
+//! Zstandard needs a level in its order, layer by layer, where a bake makes all layers of a band at once:
+//! rows lie in a plain file without a name until they are compressed. `docs/formats.md` has the layout.
 
 mod container;
 mod picture;

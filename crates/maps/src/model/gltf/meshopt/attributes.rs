@@ -1,7 +1,7 @@
 //! Codec of attributes (`KHR_meshopt_compression`, appendix A, mode 0), versions 0 and 1.
 //!
-//! Elements come in blocks. In a block each byte of an element has its deltas beside one another, in groups of
-//! sixteen that are packed alike; four bytes are a channel, whose deltas are undone together.
+//! Elements come in blocks. In a block each byte of an element has its deltas beside one another, in groups
+//! of sixteen that are packed alike; four bytes are a channel, whose deltas are undone together.
 
 use super::stream::{Damage, Stream, TRUNCATED, UNKNOWN, unzigzag};
 
@@ -11,8 +11,8 @@ const GROUP: usize = 16;
 /// Most elements of a block.
 const MAX_BLOCK: usize = 256;
 
-/// Most bytes that a byte of the stream stands for: a block of [`MAX_BLOCK`] elements has at least its control
-/// header, two bits for each byte of an element, where all deltas are zero.
+/// Most bytes that a byte of the stream stands for: a block of [`MAX_BLOCK`] elements has at least its
+/// control header, two bits for each byte of an element, where all deltas are zero.
 pub(super) const MAX_RATIO: usize = 4 * MAX_BLOCK;
 
 /// Decodes `count` elements of `stride` bytes, a multiple of 4 up to 256.

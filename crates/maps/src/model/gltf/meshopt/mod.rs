@@ -1,6 +1,6 @@
 //! Compressed views of buffers: `EXT_meshopt_compression` and `KHR_meshopt_compression`, written from the
-//! specifications of both (github.com/KhronosGroup/glTF). They differ in a version and a filter of the second,
-//! which streams name themselves: both are read under either name.
+//! specifications of both (github.com/KhronosGroup/glTF). They differ in a version and a filter of the
+//! second, which streams name themselves: both are read under either name.
 //!
 //! A compressed view becomes a buffer of its own, so that memory goes by what is decoded, not by what a
 //! document says about the buffer for readers without the extension. That one is not opened where only
@@ -27,8 +27,8 @@ use crate::MapError;
 /// Names of the extension, of which a view has one.
 pub(super) const NAMES: [&str; 2] = ["KHR_meshopt_compression", "EXT_meshopt_compression"];
 
-/// Most bytes of all decoded views: those of the largest model, with positions, normals, tangents, coordinates
-/// and three indices for each vertex.
+/// Most bytes of all decoded views: those of the largest model, with positions, normals, tangents,
+/// coordinates and three indices for each vertex.
 const MAX_BYTES: usize = 60 * MAX_ELEMENTS;
 
 #[derive(Clone, Copy, Debug, Deserialize)]

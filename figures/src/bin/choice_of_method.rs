@@ -1,0 +1,110 @@
+//! Error of a few methods over a folder of normal maps, at texels and between them: the table of
+//! `docs/choose.md`.
+//!
+//! `cargo run --release -p ndfmap-figures --bin choice_of_method -- FOLDER [LOBE]`
+
+use std::path::{Path, PathBuf};
+
+use ndfmap::compare::{Comparison, Row, Subject, compare};
+use ndfmap::core::brdf::AnyLobe;
+use ndfmap::core::ndf::AnyMethod;
+use ndfmap::core::observe::Unobserved;
+use ndfmap::core::pyramid::Precision;
+use ndfmap::maps::formats::{is_picture, read_file, read_image};
+use ndfmap::maps::source::{Convention, PictureKind, SourceOptions, identify, source_of_image};
+
+/// Methods, the one that others are divided by first.
+const METHODS: [&str; 7] = ["toksvig", "naive", "slopes", "vmf:1", "vmf:2", "vmf:3", "vmf:4"];
+
+/// Levels over which errors are averaged: those of distances at which maps are seen.
+const LEVELS: std::ops::RangeInclusive<usize> = 2..=7;
+
+/// Lobe unless told otherwise: GGX of roughness 0.45.
+const LOBE: &str = "roughness:0.45";
+
+/// Measures of a method on one map.
+struct Measures {
+    at: f64,
+    between: f64,
+}
+
+impl Measures {
+    fn of(row: &Row) -> Self {
+        let mean = |errors: Vec<f64>| errors.iter().sum::<f64>() / errors.len().max(1) as f64;
+        let at = row.levels.iter().filter(|e| LEVELS.contains(&e.level)).map(|e| e.error);
+        let between = row.filtering.iter().filter(|e| LEVELS.contains(&e.level)).map(|e| e.filtered);
+        Self { at: mean(at.collect()), between: mean(between.collect()) }
+    }
+}
+
+/// Compares the methods on a map; `None` for a picture that is no normal map.
+fn measured(
+    path: &Path,
+    methods: &[AnyMethod],
+    lobe: &AnyLobe,
+) -> Result<Option<Comparison>, Box<dyn std::error::Error>> {
+    let image = read_image(path, &read_file(path)?)?;
+    if identify(path, &image).kind != PictureKind::Normal {
+        return Ok(None);
+    }
+    // A map that does not tell where green points has the same errors either way.
+    let auto = source_of_image(path, image.clone(), String::new(), &SourceOptions::default());
+    let up = SourceOptions { convention: Some(Convention::OpenGl), ..SourceOptions::default() };
+    let map = auto.or_else(|_| source_of_image(path, image, String::new(), &up))?;
+    let subject = Subject {
+        name: "map",
+        surface: &*map.surface,
+        lobe: &**lobe,
+        methods,
+        baked: &[],
+        precision: Precision::Half,
+        filtering: true,
+    };
+    Ok(Some(compare(&subject, &Unobserved)?))
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len() % 2 == 1 { values[middle] } else { (values[middle - 1] + values[middle]) / 2.0 }
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let folder = arguments.next().ok_or("name a folder of normal maps")?;
+    let lobe = arguments.next().unwrap_or_else(|| LOBE.to_owned()).parse::<AnyLobe>()?;
+    let methods = METHODS.map(str::parse::<AnyMethod>).into_iter().collect::<Result<Vec<_>, _>>()?;
+    let mut files: Vec<PathBuf> =
+        std::fs::read_dir(folder)?.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    files.retain(|file| is_picture(file));
+    files.sort();
+    let mut all: Vec<Comparison> = Vec::new();
+    for file in files {
+        if let Some(comparison) = measured(&file, &methods, &lobe)? {
+            eprintln!("{}", file.display());
+            all.push(comparison);
+        }
+    }
+    println!("{} maps, {lobe}, levels {} to {}", all.len(), LEVELS.start(), LEVELS.end());
+    println!("method    bytes   texels  between   of toksvig's: texels  between  worst  better on");
+    for (at, method) in METHODS.iter().enumerate() {
+        let measures: Vec<Measures> = all.iter().map(|c| Measures::of(&c.rows[at])).collect();
+        let base: Vec<Measures> = all.iter().map(|c| Measures::of(&c.rows[0])).collect();
+        let ratios = |of: fn(&Measures) -> f64| -> Vec<f64> {
+            measures.iter().zip(&base).map(|(m, b)| of(m) / of(b)).collect()
+        };
+        let between = ratios(|m| m.between);
+        println!(
+            "{method:9} {:>5}  {:>7.3}  {:>7.3}  {:>21.3}  {:>7.3}  {:>5.2}  {:>3} of {}",
+            all.first().map_or(0, |c| c.rows[at].bytes_per_texel),
+            median(measures.iter().map(|m| m.at).collect()),
+            median(measures.iter().map(|m| m.between).collect()),
+            median(ratios(|m| m.at)),
+            median(between.clone()),
+            between.iter().copied().fold(0.0, f64::max),
+            between.iter().filter(|ratio| **ratio < 1.0).count(),
+            between.len()
+        );
+    }
+    Ok(())
+}
