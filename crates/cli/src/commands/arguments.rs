@@ -27,6 +27,7 @@ use crate::voice::{detail, say, warn};
 
 /// Reading of the source map.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Reading of the map")]
 pub(super) struct SourceArguments {
     /// Layer, part or channel of an OpenEXR file that has several
     #[arg(long, value_name = "NAME")]
@@ -58,6 +59,7 @@ pub(super) struct SourceArguments {
 
 /// Size of built-in maps.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Reading of the map")]
 pub(super) struct BuiltinSize {
     /// Size of built-in maps, as in 512 or 640x480 [default: 512]
     #[arg(long, value_name = "SIZE", value_parser = size)]
@@ -209,6 +211,7 @@ impl std::convert::From<Precision> for pyramid::Precision {
 
 /// Light from everywhere.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Light from everywhere")]
 pub(super) struct EnvironmentArguments {
     /// Light the scene by an environment in place of its own lights: a float picture (.hdr, .exr) by latitude
     /// and longitude or of a cube, or `builtin:NAME`

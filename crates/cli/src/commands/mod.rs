@@ -38,6 +38,7 @@ pub(crate) struct Program {
 }
 
 #[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Options of every command")]
 struct Global {
     /// Print one JSON document on stdout
     #[arg(long, global = true)]

@@ -136,6 +136,7 @@ pub(super) struct Render {
 
 /// Displacement of the meshes.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Displacement")]
 pub(super) struct DisplaceArguments {
     /// Height maps displace what they lie on, by SCALE times what keeps their slopes; lobes become
     /// microfacets, and the truth is that of the displaced surface
@@ -163,6 +164,7 @@ fn scale(text: &str) -> Result<f64, String> {
 
 /// Look-up of maps.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Look-up of maps")]
 pub(super) struct FilterArguments {
     /// `trilinear`; `anisotropic:N`, with up to N taps along the longer axis, as texture units do; or
     /// `fine:N`, the same in four times the taps at a level one finer, nearer to the pixel's square

@@ -136,16 +136,11 @@ pub(super) fn read_layer(path: &Path, bytes: &[u8], layer: Option<&str>) -> Resu
         image.layer_data.iter().map(|part| part.channel_data.list.iter().collect()).collect();
     if let Some(layer) = layer {
         let whole = |part: usize| {
-            image.layer_data[part]
-                .attributes
-                .layer_name
-                .as_ref()
-                .is_some_and(|name| name.to_string() == layer)
+            image.layer_data[part].attributes.layer_name.as_ref().is_some_and(|name| name == layer)
         };
         let all = channel_names(&parts);
         for (_, channels) in parts.iter_mut().enumerate().filter(|(part, _)| !whole(*part)) {
-            channels
-                .retain(|channel| layer_and_name(channel).0 == layer || channel.name.to_string() == layer);
+            channels.retain(|channel| layer_and_name(channel).0 == layer || channel.name == *layer);
         }
         if parts.iter().all(Vec::is_empty) {
             let reason = format!("has no layer, part or channel `{layer}`. Channels: {all}");
