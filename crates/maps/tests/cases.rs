@@ -237,3 +237,37 @@ fn damaged_cases_are_errors_or_pictures() {
         }
     }
 }
+
+#[test]
+fn tiff_of_reversed_bits_is_refused_by_name() {
+    // One grey byte: little endian, eight entries, FillOrder (266) the fifth.
+    let tiff = |fill_order: u32| {
+        let entries: [(u16, u32); 8] =
+            [(256, 1), (257, 1), (258, 8), (262, 1), (266, fill_order), (273, 110), (278, 1), (279, 1)];
+        let mut bytes = b"II*\0\x08\0\0\0\x08\0".to_vec();
+        for (tag, value) in entries {
+            bytes.extend(tag.to_le_bytes());
+            bytes.extend(4_u16.to_le_bytes());
+            bytes.extend(1_u32.to_le_bytes());
+            bytes.extend(value.to_le_bytes());
+        }
+        bytes.extend([0; 4]);
+        bytes.push(51);
+        bytes
+    };
+    let read = |order: u32| read_image(Path::new("a.tif"), &tiff(order));
+    assert_eq!(read(1).unwrap().samples, ndfmap_maps::Samples::U8(vec![51]));
+    let error = read(2).err().unwrap().to_string();
+    assert!(error.contains("FillOrder 2"), "{error}");
+}
+
+#[test]
+fn a_picture_of_bits_may_be_small() {
+    // 4096 × 4096 bits of one palette deflate to some two thousand bytes.
+    let mut png = Vec::new();
+    let mut encoder = png::Encoder::new(&mut png, 4096, 4096);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::One);
+    encoder.write_header().unwrap().write_image_data(&[255; 512 * 4096]).unwrap();
+    assert_eq!(read_image(Path::new("a.png"), &png).unwrap().size.width, 4096);
+}

@@ -433,3 +433,50 @@ fn an_fbx_is_turned_upright_and_posed() {
         assert!((v.position.y - 3.0).abs() < 1e-6, "{}", v.position);
     }
 }
+
+#[test]
+fn files_are_read_as_exporters_write_them() {
+    // Corners without a normal beside corners that have one: they get that of their triangle.
+    let partial = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 1\nf 1//1 2//1 3//1\nf 1 3 4\n";
+    let (scene, _) = read("a.obj", partial.as_bytes()).unwrap();
+    let normals: Vec<Vec3> = scene.objects[0].mesh.vertices.iter().map(|v| v.normal).collect();
+    assert!(normals.contains(&Vec3::Z) && normals.contains(&Vec3::X), "{normals:?}");
+    // UTF-16 behind its mark, either way round.
+    for big in [false, true] {
+        let units = OBJ.encode_utf16().map(|u| if big { u.to_be_bytes() } else { u.to_le_bytes() });
+        let mark = if big { [0xfe, 0xff] } else { [0xff, 0xfe] };
+        let bytes: Vec<u8> = std::iter::once(mark).chain(units).flatten().collect();
+        assert_eq!(read("a.obj", &bytes).unwrap().0.objects[0].mesh.triangles.len(), 2);
+    }
+    // Lines that end with a carriage return alone, and blanks where they please.
+    for text in [PLY.replace('\n', "\r"), PLY.replace('\n', "\r\n"), PLY.replace("element ", "  element\t")] {
+        assert_eq!(read("a.ply", text.as_bytes()).unwrap().0.objects[0].mesh.triangles.len(), 2, "{text:?}");
+    }
+    // Attributes of applications.
+    let own = changed(|json| json["meshes"][0]["primitives"][0]["attributes"]["_FEATURE_ID_0"] = 0.into());
+    assert!(read("a.gltf", &own).is_ok());
+    // One colour of all vertices, without a material: linear, dielectric.
+    let magenta = changed(|json| {
+        let primitive = &mut json["meshes"][0]["primitives"][0];
+        primitive.as_object_mut().unwrap().remove("material");
+        primitive["attributes"]["COLOR_0"] = 3.into();
+        let colours: Vec<u8> = [1_f32, 0.0, 1.0].repeat(4).iter().flat_map(|c| c.to_le_bytes()).collect();
+        let data = base64::Engine::encode(&base64::engine::general_purpose::STANDARD, colours);
+        let uri = format!("data:application/octet-stream;base64,{data}");
+        let buffers = json["buffers"].as_array_mut().unwrap();
+        buffers.push(serde_json::json!({ "byteLength": 48, "uri": uri }));
+        let views = json["bufferViews"].as_array_mut().unwrap();
+        views.push(serde_json::json!({ "buffer": 1, "byteLength": 48 }));
+        let accessors = json["accessors"].as_array_mut().unwrap();
+        accessors
+            .push(serde_json::json!({ "componentType": 5126, "count": 4, "type": "VEC3", "bufferView": 4 }));
+    });
+    let (scene, _) = read("a.gltf", &magenta).unwrap();
+    assert_eq!(scene.materials[scene.objects[0].material].params.diffuse, DVec3::new(1.0, 0.0, 1.0));
+    // A material library that its reader refuses.
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.mtl"), "newmtl\nKd 1 0 0\n").unwrap();
+    std::fs::write(folder.path().join("a.obj"), format!("mtllib a.mtl\nusemtl x\n{OBJ}")).unwrap();
+    let (_, warnings) = read_model(&folder.path().join("a.obj"), &options()).unwrap();
+    assert!(warnings[0].contains("materials that are damaged"), "{warnings:?}");
+}

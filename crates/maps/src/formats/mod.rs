@@ -232,5 +232,11 @@ pub fn read_image_layer(path: &Path, bytes: &[u8], layer: &str) -> Result<Image,
 /// # Errors
 /// [`MapError`] when the file is damaged or holds no picture.
 pub fn read_image(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
-    (detect(path, bytes)?.read_image)(path, bytes)
+    let format = detect(path, bytes)?;
+    // Failed assertions of a decoder are caught: the fault is the file's, which may be hostile, or its own.
+    let read = std::panic::AssertUnwindSafe(|| (format.read_image)(path, bytes));
+    std::panic::catch_unwind(read).unwrap_or_else(|_| {
+        let reason = format!("is damaged in a way that the {} reader cannot handle", format.name);
+        Err(MapError::invalid(path, reason))
+    })
 }

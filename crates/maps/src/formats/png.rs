@@ -52,8 +52,8 @@ fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
     let mut reader = decoder.read_info().map_err(invalid)?;
     let info = reader.info();
     let size = check_size(path, info.width as usize, info.height as usize)?;
-    let length = reader.output_buffer_size().unwrap_or(usize::MAX);
-    if length / MAX_DEFLATE_RATIO > bytes.len() {
+    // Rows as they are deflated, a bit a texel perhaps.
+    if info.raw_bytes() / MAX_DEFLATE_RATIO > bytes.len() {
         let reason = format!(
             "is truncated: {} bytes cannot hold {} × {} texels",
             bytes.len(),
@@ -62,6 +62,7 @@ fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
         );
         return Err(MapError::invalid(path, reason));
     }
+    let length = reader.output_buffer_size().unwrap_or(usize::MAX);
     let mut buffer = vec![0; length];
     let frame = reader.next_frame(&mut buffer).map_err(invalid)?;
     // Data after the picture may be missing; the picture itself is whole here.

@@ -32,6 +32,12 @@ const PHOTOMETRIC: u16 = 262;
 /// Value of the tag Compression for Zstandard.
 const ZSTD: u16 = 50000;
 
+/// Values of the tag Compression for facsimiles: CCITT's group 3, in one dimension and in two, and group 4.
+const FACSIMILE: std::ops::RangeInclusive<u16> = 2..=4;
+
+/// Value of the tag FillOrder for bytes whose bits are turned around.
+const BITS_REVERSED: u16 = 2;
+
 /// Value of [`PHOTOMETRIC`] for grey, zero black.
 const GREY: u16 = 1;
 
@@ -135,12 +141,31 @@ fn read_samples(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
         decoder.get_tag_ascii_string(NO_DATA).ok().and_then(|t| t.trim_end_matches('\0').trim().parse().ok());
     // The compression's ratio bounds what a file this long can hold, as for PNG. Zstandard's blocks of one
     // repeated byte stand for 128 KiB in four; LZW and PackBits stay below Deflate.
-    let zstd = decoder.get_tag_unsigned(Tag::Compression).is_ok_and(|kind: u16| kind == ZSTD);
-    let most = if zstd { 1 << 15 } else { 1032 };
-    if size.area() / most > bytes.len() {
+    let compression = decoder.get_tag_unsigned(Tag::Compression).unwrap_or(1_u16);
+    let most = if compression == ZSTD { 1 << 15 } else { 1032 };
+    let sample_bits: u16 = decoder.get_tag_unsigned(Tag::BitsPerSample).unwrap_or(8);
+    // A row of a facsimile takes a bit at least.
+    let least = match FACSIMILE.contains(&compression) {
+        true => size.height / 8,
+        false => size.area() / 8 * usize::from(sample_bits.clamp(1, 64)) / most,
+    };
+    if least > bytes.len() {
         return Err(MapError::invalid(
             path,
             format!("is truncated: {} bytes cannot hold {width} × {height} texels", bytes.len()),
+        ));
+    }
+    if decoder.get_tag_unsigned(Tag::FillOrder).is_ok_and(|order: u16| order == BITS_REVERSED) {
+        return Err(MapError::unsupported(
+            path,
+            "has the bits of its bytes reversed (FillOrder 2): save it without",
+        ));
+    }
+    let tiled = decoder.find_tag(Tag::TileWidth).map_err(invalid)?.is_some();
+    if tiled && decoder.get_tag_unsigned(Tag::PlanarConfiguration).is_ok_and(|plan: u16| plan == 2) {
+        return Err(MapError::unsupported(
+            path,
+            "has planes in tiles: save it in strips, or with its channels together",
         ));
     }
     let orientation = orientation(path, decoder.get_tag_unsigned(Tag::Orientation).unwrap_or(1))?;

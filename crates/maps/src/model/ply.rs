@@ -224,16 +224,23 @@ fn polygon(positions: &[Vec3]) -> Vec<[usize; 3]> {
     cut.into_iter().map(|[a, b, c]| if against { [a, c, b] } else { [a, b, c] }).collect()
 }
 
-/// The same file as the crate can read it: no blank lines, nothing but ASCII in the header.
+/// The same file as the crate can read it: lines that end with a line feed, begin with a word and are not
+/// blank, single blanks between words, and nothing but ASCII in the header.
 fn tidied(bytes: &[u8]) -> Cow<'_, [u8]> {
     const END: &[u8] = b"end_header";
     let Some(at) = bytes.windows(END.len()).position(|w| w == END) else { return Cow::Borrowed(bytes) };
-    let line_end = bytes[at..].iter().position(|b| *b == b'\n').map_or(bytes.len(), |n| at + n + 1);
+    let breaks = |b: &u8| *b == b'\n' || *b == b'\r';
+    let end = bytes[at..].iter().position(breaks).map_or(bytes.len(), |n| at + n);
+    // A line ends with one byte, or with a carriage return and a line feed.
+    let line_end = match bytes.get(end..) {
+        Some([b'\r', b'\n', ..]) => end + 2,
+        _ => (end + 1).min(bytes.len()),
+    };
     let (header, payload) = bytes.split_at(line_end);
     let mut out = Vec::with_capacity(bytes.len());
     push_lines(&mut out, header);
     out.iter_mut().filter(|b| !b.is_ascii()).for_each(|b| *b = b'?');
-    let ascii = header.split(|b| *b == b'\n').any(|line| line.trim_ascii().starts_with(b"format ascii"));
+    let ascii = out.split(|b| *b == b'\n').any(|line| line.starts_with(b"format ascii"));
     if ascii {
         push_lines(&mut out, payload);
     } else {
@@ -242,10 +249,16 @@ fn tidied(bytes: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(out)
 }
 
-/// Lines that are not blank.
+/// Words of the lines that are not blank.
 fn push_lines(out: &mut Vec<u8>, lines: &[u8]) {
-    for line in lines.split_inclusive(|b| *b == b'\n').filter(|line| !line.trim_ascii().is_empty()) {
-        out.extend_from_slice(line);
+    for line in lines.split(|b| *b == b'\n' || *b == b'\r').filter(|line| !line.trim_ascii().is_empty()) {
+        for (at, word) in line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).enumerate() {
+            if at > 0 {
+                out.push(b' ');
+            }
+            out.extend_from_slice(word);
+        }
+        out.push(b'\n');
     }
 }
 

@@ -4,6 +4,7 @@
 //! Textures are looked for beside the model by their relative names, then by their last names, there and in
 //! a folder `textures`: files name the folders of whoever wrote them.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -50,8 +51,9 @@ fn read(
     warnings: &mut Vec<String>,
 ) -> Result<Parts, MapError> {
     let is_obj = file_format == FileFormat::Obj;
+    let bytes = &*if is_obj { without_utf16(bytes) } else { Cow::Borrowed(bytes) };
     let library = if is_obj { material_library(path, bytes, warnings) } else { Vec::new() };
-    let opts = LoadOpts {
+    let opts = |library: &[u8]| LoadOpts {
         temp_allocator: memory(bytes),
         result_allocator: memory(bytes),
         ignore_animation: true,
@@ -61,11 +63,22 @@ fn read(
             true => CoordinateAxes::default(),
             false => CoordinateAxes::right_handed_y_up(),
         },
-        obj_mtl_data: library.as_slice().into(),
+        obj_mtl_data: library.to_vec().into(),
         ..LoadOpts::default()
     };
-    let scene = ufbx::load_memory(bytes, opts)
-        .map_err(|e| MapError::invalid(path, format!("is damaged: {}", e.description.to_lowercase())))?;
+    let load = |library: &[u8]| ufbx::load_memory(bytes, opts(library));
+    let scene = load(&library).or_else(|e| {
+        if library.is_empty() {
+            return Err(e);
+        }
+        warnings.push("names materials that are damaged: they are plain".to_owned());
+        load(&[])
+    });
+    let scene = scene.map_err(|e| {
+        let info = e.info();
+        let more = if info.is_empty() { String::new() } else { format!(" ({info})") };
+        MapError::invalid(path, format!("is damaged: {}{more}", e.description.to_lowercase()))
+    })?;
     let mut parts = Parts::default();
     for material in &scene.materials {
         parts.materials.push(Look { path, material }.read(warnings)?);
@@ -109,6 +122,18 @@ fn read(
 
 /// Coordinates that the library gives to corners without any, v turned down.
 const NO_COORDINATES: Vec2 = Vec2::new(0.0, 1.0);
+
+/// Text in UTF-8, where a mark says that it is in UTF-16.
+fn without_utf16(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let read: fn([u8; 2]) -> u16 = match bytes {
+        [0xff, 0xfe, ..] => u16::from_le_bytes,
+        [0xfe, 0xff, ..] => u16::from_be_bytes,
+        _ => return Cow::Borrowed(bytes),
+    };
+    let units = bytes[2..].as_chunks().0.iter().copied().map(read);
+    let text: String = char::decode_utf16(units).map(|c| c.unwrap_or('\u{fffd}')).collect();
+    Cow::Owned(text.into_bytes())
+}
 
 /// Bytes of the material library that an OBJ names; none where it names none, or it cannot be read.
 fn material_library(path: &Path, bytes: &[u8], warnings: &mut Vec<String>) -> Vec<u8> {
@@ -174,7 +199,12 @@ impl Shape<'_> {
                 let corners = corners.map(|c| c as usize);
                 out.triangles.push(corners.map(|c| mesh.vertex_indices[c]));
                 if mesh.vertex_normal.exists {
-                    let normal = |c: usize| (turned * vector(&mesh.vertex_normal[c])).as_vec3();
+                    // A corner without a normal has that of its triangle.
+                    let own =
+                        |c: usize| mesh.vertex_normal.values.get(mesh.vertex_normal.indices[c] as usize);
+                    let [a, b, c] = corners.map(|c| out.positions[mesh.vertex_indices[c] as usize]);
+                    let flat = (b - a).cross(c - a).normalize_or_zero();
+                    let normal = |c: usize| own(c).map_or(flat, |n| (turned * vector(n)).as_vec3());
                     out.normals.extend(corners.map(normal));
                 }
                 if mesh.vertex_uv.exists {

@@ -12,9 +12,10 @@ use crate::MapError;
 use crate::formats::read_file;
 
 /// Extensions that a file may require, besides [`meshopt::NAMES`].
-const READ_EXTENSIONS: [&str; 6] = [
+const READ_EXTENSIONS: [&str; 7] = [
     "KHR_texture_transform",
     "KHR_lights_punctual",
+    "KHR_materials_unlit",
     "KHR_mesh_quantization",
     "EXT_texture_webp",
     "KHR_texture_basisu",
@@ -100,6 +101,14 @@ fn refuse_unread(path: &Path, json: &Value) -> Result<(), MapError> {
 fn rewrite(json: &mut Value) {
     let Some(root) = json.as_object_mut() else { return };
     root.remove("extensionsRequired");
+    // Attributes of applications, which begin with an underscore, are no semantics that the crate knows.
+    for mesh in root.get_mut("meshes").and_then(Value::as_array_mut).into_iter().flatten() {
+        for primitive in mesh.get_mut("primitives").and_then(Value::as_array_mut).into_iter().flatten() {
+            if let Some(attributes) = primitive.get_mut("attributes").and_then(Value::as_object_mut) {
+                attributes.retain(|name, _| !name.starts_with('_'));
+            }
+        }
+    }
     for texture in root.get_mut("textures").and_then(Value::as_array_mut).into_iter().flatten() {
         if texture.get("source").is_none() {
             let named = |name: &&str| texture.pointer(&format!("/extensions/{name}/source")).cloned();

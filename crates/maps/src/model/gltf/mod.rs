@@ -16,9 +16,11 @@ use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use glam::{Mat3, Mat4, Vec3, Vec4};
+use ndfmap_core::surface::Wraps;
 
 use self::document::Opened;
 use self::textures::Laying;
+use super::material::{Factors, MetalRough};
 use super::{MAX_ELEMENTS, ModelFormat, Parts, RawMesh};
 use crate::MapError;
 
@@ -110,10 +112,11 @@ impl Walk<'_> {
         if let Some(known) = self.materials.get(&key) {
             return Ok(*known);
         }
-        // The default material is ours, not glTF's metal.
+        // The default material is ours, not glTF's metal, but for the colour of its vertices.
         let made = match material.index() {
             Some(_) => self.opened.material(&material, tint, self.warnings)?,
-            None => super::plain(),
+            None if tint == Vec3::ONE => super::plain(),
+            None => tinted(tint).into_material(self.warnings),
         };
         self.parts.materials.push(made);
         self.materials.insert(key, self.parts.materials.len() - 1);
@@ -199,6 +202,18 @@ impl Walk<'_> {
             tangents: tangents.into_iter().map(turned).collect(),
             triangles,
         })
+    }
+}
+
+/// Material of a mesh that has none but a colour of its vertices.
+fn tinted(tint: Vec3) -> MetalRough {
+    MetalRough {
+        name: "plain".to_owned(),
+        factors: Factors { base: tint.to_array(), metallic: 0.0, roughness: 0.5 },
+        normals: None,
+        base: None,
+        metal_rough: None,
+        wraps: Wraps::default(),
     }
 }
 
