@@ -1,7 +1,5 @@
 //! Tables for a terminal: the library's reports as text.
 
-use std::path::Path;
-
 use ndfmap::BakeReport;
 use ndfmap::choose::Choice;
 use ndfmap::compare::{Comparison, three_digits};
@@ -80,12 +78,11 @@ pub(crate) fn rendering(report: &RenderReport) -> String {
 }
 
 /// Line about a baked map.
-pub(crate) fn bake(output: &Path, report: &BakeReport) -> String {
+pub(crate) fn bake(output: &str, report: &BakeReport) -> String {
     let BakeReport { method, width, height, levels, layers, bytes, video_bytes, .. } = report;
     let plural = |count: &usize, one: &str| format!("{count} {one}{}", if *count == 1 { "" } else { "s" });
     format!(
-        "{}: {width} × {height}, {}, {} of {method}, {} on disk, {} in video memory",
-        output.display(),
+        "{output}: {width} × {height}, {}, {} of {method}, {} on disk, {} in video memory",
         plural(levels, "level"),
         plural(layers, "layer"),
         binary_bytes(*bytes),

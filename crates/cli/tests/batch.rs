@@ -23,13 +23,19 @@ fn several_maps_are_baked_and_one_that_fails_stops_none() {
     let out = folder.path().join("out");
     let words =
         ["bake", &text(&maps), "builtin:foil", "--map-size", "8", "--output-dir", &text(&out), "--json"];
+    // Found in a folder, a picture that is no map is left out; named, it is a failure.
     let (status, stdout, stderr) = outcome(&words);
-    assert!(status == 1 && stderr.contains("1 of 3 maps could not be baked"), "{stderr}");
+    assert!(status == 0 && stderr.contains("left out: ") && stderr.contains("red.png"), "{stderr}");
     let told: Value = serde_json::from_str(&stdout).unwrap();
     assert_eq!(told["ndfmap"]["arguments"][0], "bake");
     let rows = told["maps"].as_array().unwrap();
     assert_eq!(rows.iter().map(|row| row["error"].is_null()).collect::<Vec<_>>(), [true, false, true]);
     assert!(rows[1]["error"].as_str().unwrap().contains("looks like colours"), "{}", rows[1]);
+    assert_eq!(rows[1]["no_map"], true);
+    let named = text(&maps.join("red.png"));
+    let (status, _, stderr) =
+        outcome(&["bake", &named, "builtin:foil", "--map-size", "8", "--output-dir", &text(&out)]);
+    assert!(status == 1 && stderr.contains("1 of 2 maps could not be baked"), "{stderr}");
     for name in ["flat", "foil"] {
         assert_eq!(
             json(&["inspect", &text(&out.join(name).with_extension("ktx2")), "--json"])["method"],

@@ -115,7 +115,7 @@ fn heights_take_the_scale_of_the_normal_map_beside_them() {
     // Metres, where texture widths are due.
     let dem = text(&data.join("height/topotoolbox_bigtujunga.tif"));
     let (status, _, said) = outcome(&["bake", &dem, &output]);
-    assert!(status == 1 && said.contains("`--height-scale 1.8e-3`"), "{said}");
+    assert!(status == 1 && said.contains("`--height-scale 1.6e-5`"), "{said}");
 }
 
 #[test]

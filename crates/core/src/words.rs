@@ -38,7 +38,7 @@ macro_rules! words {
             type Err = $crate::words::UnknownWord;
 
             fn from_str(word: &str) -> Result<Self, Self::Err> {
-                Self::ALL.into_iter().find(|variant| variant.name() == word).ok_or_else(|| {
+                Self::ALL.into_iter().find(|variant| variant.name().eq_ignore_ascii_case(word)).ok_or_else(|| {
                     let known = Self::ALL.map(Self::name).join(", ");
                     $crate::words::UnknownWord { word: word.to_owned(), known }
                 })

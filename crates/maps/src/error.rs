@@ -23,6 +23,14 @@ pub enum MapError {
         /// Damage, in words.
         reason: String,
     },
+    /// The file is a sound picture, but holds neither normals nor heights.
+    #[error("{}: {reason}", path.display())]
+    NoMap {
+        /// The file.
+        path: PathBuf,
+        /// What it looks like, and why.
+        reason: String,
+    },
     /// The file is sound, but of a kind that cannot be used here.
     #[error("{}: {reason}", path.display())]
     Unsupported {
@@ -47,5 +55,11 @@ impl MapError {
     /// A sound file of the wrong kind.
     pub fn unsupported(path: &Path, reason: impl ToString) -> Self {
         Self::Unsupported { path: path.to_owned(), reason: reason.to_string() }
+    }
+
+    /// A baked map where a picture is due.
+    pub(crate) fn baked(path: &Path) -> Self {
+        let reason = "is already a baked map: `inspect` reads it, and `compare MAP --baked FILE` measures it";
+        Self::NoMap { path: path.to_owned(), reason: reason.to_owned() }
     }
 }

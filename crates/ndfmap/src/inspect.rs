@@ -76,8 +76,8 @@ pub struct SurfaceReport {
     pub mean_normal_length: f64,
     /// Variance of the slopes along x and along y.
     pub slope_variance: [f64; 2],
-    /// Measure of how well the slopes are the gradient of some height: 1 for a perfect gradient, near 0 when
-    /// nothing can be said, negative when y points the other way.
+    /// Measure of how well the slopes are the gradient of some height with green up: 1 for a perfect
+    /// gradient, near 0 when nothing can be said, negative when green points down.
     pub integrability: f64,
 }
 
@@ -308,7 +308,12 @@ pub fn describe_picture(path: &Path, options: &SourceOptions) -> Result<PictureR
         report.kind = PictureKind::Height;
     }
     report.warnings = map.warnings.clone();
-    report.surface = Some(describe_surface(&map));
+    let mut surface = describe_surface(&map);
+    if let Some(evidence) = map.convention {
+        surface.integrability = evidence.integrability;
+        surface.source.convention = report.convention.map(str::to_owned);
+    }
+    report.surface = Some(surface);
     Ok(report)
 }
 

@@ -133,7 +133,7 @@ pub static TABLE: &[Row] = &[
 /// The row of this name.
 #[must_use]
 pub fn find(name: &str) -> Option<&'static Row> {
-    TABLE.iter().find(|row| row.name == name)
+    TABLE.iter().find(|row| row.name.eq_ignore_ascii_case(name))
 }
 
 impl Scene {

@@ -1,7 +1,7 @@
 //! `ndfmap bake`: a normal or height map in, a normal distribution map out.
 
 use std::collections::HashSet;
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -60,14 +60,14 @@ pub(super) struct Bake {
     #[arg(long, value_name = "[srgb:]FILE", value_parser = attribute_path)]
     attribute: Vec<AttributePath>,
     /// Bits of a stored channel
-    #[arg(long, value_enum, default_value_t = Precision::Half)]
+    #[arg(long, value_enum, ignore_case = true, default_value_t = Precision::Half)]
     precision: Precision,
     /// Compress a KTX2 with Zstandard, at a level from 1 (fast) to 22; 0 writes it plain [default: 3]
     #[arg(long, value_name = "LEVEL", num_args = 0..=1, require_equals = true, default_missing_value = "3",
         value_parser = clap::value_parser!(i32).range(0..=22))]
     zstd: Option<i32>,
     /// Channels of an EXR: our RGBA layers, or OpenImageIO's six `bumpslopes` channels
-    #[arg(long, value_enum, default_value_t = Layout::Native)]
+    #[arg(long, value_enum, ignore_case = true, default_value_t = Layout::Native)]
     layout: Layout,
     #[command(flatten)]
     source: SourceArguments,
@@ -115,16 +115,32 @@ const AUTO_LOBE: &str = "blinn-phong:50";
 struct Pair {
     map: PathBuf,
     output: PathBuf,
+    /// The map was found in a folder, not named.
+    found: bool,
 }
 
 /// Outcome of one map among several, for scripts.
 #[derive(Serialize)]
 struct Outcome {
-    map: PathBuf,
-    output: PathBuf,
+    map: String,
+    output: String,
     #[serde(flatten)]
     report: Option<BakeReport>,
+    /// Reason why there is no output.
+    #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<String>,
+    /// True for a picture of a folder that holds neither normals nor heights.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    no_map: bool,
+}
+
+impl Outcome {
+    fn new(pair: &Pair, baked: Result<BakeReport, Error>) -> Self {
+        let spelled = |path: &Path| path.display().to_string();
+        let no_map = pair.found && matches!(baked, Err(Error::Map(MapError::NoMap { .. })));
+        let error = baked.as_ref().err().map(ToString::to_string);
+        Self { map: spelled(&pair.map), output: spelled(&pair.output), report: baked.ok(), error, no_map }
+    }
 }
 
 impl Bake {
@@ -180,7 +196,7 @@ impl Bake {
                 let why = "is a folder: `--output-dir` writes into one";
                 return Err(Error::Request(format!("{}: {why}", output.display())));
             }
-            Ok(vec![Pair { map: map.clone(), output: output.clone() }])
+            Ok(vec![Pair { map: map.clone(), output: output.clone(), found: false }])
         };
         match (&self.maps[..], &self.output) {
             ([map], _) if map.is_dir() => {
@@ -194,8 +210,16 @@ impl Bake {
                 map.display(),
                 named_after(map, "ktx2").display()
             ))),
-            _ => {
-                Err(Error::Request("several maps need `--output-dir DIR`, a folder to write into".to_owned()))
+            (_, Some(output)) => Err(Error::Request(format!(
+                "{}: is one output; several maps need `--output-dir DIR`, a folder to write into",
+                output.display()
+            ))),
+            (maps, None) => {
+                let why = maps.last().and_then(|last| to_write(last).err());
+                let why = why.map(|e| format!("{e}; ")).unwrap_or_default();
+                Err(Error::Request(format!(
+                    "{why}several maps need `--output-dir DIR`, a folder to write into"
+                )))
             }
         }
     }
@@ -203,13 +227,13 @@ impl Bake {
     fn pairs_into(&self, folder: &Path) -> Result<Vec<Pair>, Error> {
         let extension = if self.layout == Layout::Bumpslopes { "exr" } else { "ktx2" };
         let mut pairs = Vec::new();
-        let mut add = |map: PathBuf| {
+        let mut add = |map: PathBuf, found: bool| {
             let output = folder.join(named_after(&map, extension));
-            pairs.push(Pair { map, output });
+            pairs.push(Pair { map, output, found });
         };
         for map in &self.maps {
             if !map.is_dir() {
-                add(map.clone());
+                add(map.clone(), false);
                 continue;
             }
             let read = std::fs::read_dir(map).map_err(|e| MapError::io(map, e))?;
@@ -219,7 +243,7 @@ impl Bake {
                 return Err(Error::Request(format!("{}: holds no picture", map.display())));
             }
             inside.sort();
-            inside.into_iter().for_each(&mut add);
+            inside.into_iter().for_each(|map| add(map, true));
         }
         let mut seen = HashSet::new();
         if let Some(twice) = pairs.iter().find(|pair| !seen.insert(&pair.output)) {
@@ -253,7 +277,11 @@ impl Bake {
     }
 
     /// Bakes one map.
-    fn bake(&self, Pair { map: path, output }: &Pair, observer: &dyn Observer) -> Result<BakeReport, Error> {
+    fn bake(
+        &self,
+        Pair { map: path, output, .. }: &Pair,
+        observer: &dyn Observer,
+    ) -> Result<BakeReport, Error> {
         let start = Instant::now();
         let map = self.source.read(path, &self.builtin)?;
         let size = map.surface.size();
@@ -300,17 +328,20 @@ impl Bake {
         self.check(&pairs)?;
         let terminal = Terminal::default();
         if let ([pair], None) = (&pairs[..], &self.output_dir) {
+            if is_standard(&pair.output) && std::io::stdout().is_terminal() {
+                let why = "a map is nothing for a terminal: name a file, or send it to another program";
+                return Err(Error::Request(why.to_owned()));
+            }
             if is_standard(&pair.output) && json {
                 return Err(Error::Request("`--json` and a map cannot both go to stdout".to_owned()));
             }
             let report = self.bake(pair, &terminal)?;
             if json {
-                let Pair { map, output } = pair.clone();
-                return print_json(&Outcome { map, output, report: Some(report), error: None });
+                return print_json(&Outcome::new(pair, Ok(report)));
             }
             return match is_standard(&pair.output) {
                 true => Ok(()),
-                false => print(&tables::bake(&pair.output, &report)),
+                false => print(&tables::bake(&pair.output.display().to_string(), &report)),
             };
         }
         self.bake_all(pairs, &terminal, json)
@@ -325,19 +356,22 @@ impl Bake {
             let baked = self.bake(&pair, &Unobserved);
             let done = 1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
             terminal.progress(done as f64 / count as f64);
-            let error = baked.as_ref().err().map(ToString::to_string);
-            Outcome { map: pair.map, output: pair.output, report: baked.ok(), error }
+            Outcome::new(&pair, baked)
         };
         let outcomes: Vec<Outcome> = pairs.into_par_iter().map(bake).collect();
-        let failed = outcomes.iter().filter(|outcome| outcome.error.is_some()).count();
+        let failed = outcomes.iter().filter(|outcome| outcome.error.is_some() && !outcome.no_map).count();
+        for outcome in &outcomes {
+            match &outcome.error {
+                Some(reason) if outcome.no_map => say(format_args!("left out: {reason}")),
+                Some(reason) => eprintln!("ndfmap: failed: {reason}"),
+                None => {}
+            }
+        }
         if json {
             print_json(&serde_json::json!({ "maps": super::to_value(&outcomes)? }))?;
         } else {
-            let row = |o: &Outcome| match (&o.report, &o.error) {
-                (Some(report), _) => tables::bake(&o.output, report),
-                (None, error) => format!("{}: failed", error.as_deref().unwrap_or_default()),
-            };
-            print(&outcomes.iter().map(row).collect::<Vec<_>>().join("\n"))?;
+            let rows = outcomes.iter().filter_map(|o| Some(tables::bake(&o.output, o.report.as_ref()?)));
+            print(&rows.collect::<Vec<_>>().join("\n"))?;
         }
         match failed {
             0 => Ok(()),

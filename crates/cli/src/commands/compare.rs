@@ -23,9 +23,10 @@ use super::arguments::{
     method_spelling, methods_help, read_brdf, scene_name, size,
 };
 use super::render::{DisplaceArguments, FilterArguments, check_drift};
-use super::{make_folder, make_way, print, print_json, say_written, to_value};
+use super::{check_kept, make_folder, make_way, print, print_json, say_written, to_value};
 use crate::tables;
 use crate::terminal::Terminal;
+use crate::voice::warn;
 
 /// Methods of every comparison unless told otherwise: the baselines, each linear method, and mixtures.
 pub(super) const DEFAULT_METHODS: &str =
@@ -48,7 +49,7 @@ pub(super) struct Compare {
     #[arg(long, default_value = "blinn-phong:50", value_parser = brdf_spelling)]
     brdf: String,
     /// Bits of a stored channel; errors are those of the stored map
-    #[arg(long, value_enum, default_value_t = Precision::Half)]
+    #[arg(long, value_enum, ignore_case = true, default_value_t = Precision::Half)]
     precision: Precision,
     /// Also measure between texels, where a filter mixes lobes: filtered, and by shading every neighbour
     #[arg(long)]
@@ -107,7 +108,7 @@ impl Compare {
             check_drift(self.size)?;
         }
         let map = self.source.read(&self.map, &self.builtin)?;
-        let baked = self.baked.iter().map(|path| open_baked(path)).collect::<Result<Vec<_>, _>>()?;
+        let baked = self.baked.iter().map(|path| open_baked(path, &map)).collect::<Result<Vec<_>, _>>()?;
         let environment = self.environment.read()?;
         let brdf: AnyLobe = read_brdf(&self.brdf)?;
         let run = Run {
@@ -160,12 +161,20 @@ impl Compare {
     }
 }
 
-/// Opens a file that was baked before.
-fn open_baked(path: &Path) -> Result<BakedFile, Error> {
+/// Opens a file that was baked from the source before; warns where its header says that it was baked from
+/// another, or otherwise.
+fn open_baked(path: &Path, source: &SourceMap) -> Result<BakedFile, Error> {
     let map = read_ndf(path, &read_file(path)?)?.ok_or_else(|| {
         let why = "is no baked map: the map to compare comes first, and `--baked` names what was baked of it";
         Error::Request(format!("{}: {why}", path.display()))
     })?;
+    let (own, due) = (&map.header.source, &source.source);
+    if own.sha256 != due.sha256 || own.sha256.is_empty() && own.file != due.file {
+        let file = &own.file;
+        warn(path, &format!("was baked from another picture, `{file}`: its errors are those of a stranger"));
+    } else if own.convention != due.convention || own.height_scale != due.height_scale {
+        warn(path, "was baked from this picture by another convention, or at another height scale");
+    }
     Ok(BakedFile { path: path.to_owned(), map })
 }
 
@@ -203,6 +212,7 @@ impl Run<'_> {
         // A folder that cannot be made, or a missing scene, should fail before the minutes of measuring.
         if let Some(folder) = folder {
             make_folder(folder)?;
+            check_kept(&folder.join(report::PAGE))?;
         }
         let pictures = self.pictures.as_ref().map(|pictures| self.render(pictures, terminal)).transpose()?;
         let subject = Subject {

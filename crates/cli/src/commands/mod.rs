@@ -106,7 +106,8 @@ pub(crate) fn equals_hint(arguments: impl Iterator<Item = String>) -> Option<Str
     let arguments: Vec<String> = arguments.collect();
     let [option, value] = arguments
         .windows(2)
-        .find(|two| OPTIONAL_VALUES.contains(&two[0].as_str()) && two[1].parse::<f64>().is_ok())?
+        .find(|two| OPTIONAL_VALUES.contains(&two[0].as_str()) && two[1].parse::<f64>().is_ok())
+        .filter(|two| arguments[0] != "compare" || two[0] != "--truth")?
     else {
         return None;
     };
@@ -149,6 +150,14 @@ fn to_value(report: &impl Serialize) -> Result<Value, Error> {
 /// True where no file may be replaced.
 static NO_CLOBBER: AtomicBool = AtomicBool::new(false);
 
+/// Refuses, before long work, a file that `--no-clobber` would keep.
+fn check_kept(path: &Path) -> Result<(), Error> {
+    if NO_CLOBBER.load(Ordering::Relaxed) && path.exists() {
+        return Err(Error::Failed(format!("{}: is there, and `--no-clobber` keeps it", path.display())));
+    }
+    Ok(())
+}
+
 /// Makes way for a file: says that it is replaced, or refuses to.
 fn make_way(path: &Path) -> Result<(), Error> {
     if path.is_dir() {
@@ -157,9 +166,7 @@ fn make_way(path: &Path) -> Result<(), Error> {
     if !path.exists() {
         return Ok(());
     }
-    if NO_CLOBBER.load(Ordering::Relaxed) {
-        return Err(Error::Failed(format!("{}: is there, and `--no-clobber` keeps it", path.display())));
-    }
+    check_kept(path)?;
     say(format_args!("replacing {}", path.display()));
     Ok(())
 }

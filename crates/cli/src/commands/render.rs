@@ -28,7 +28,7 @@ use super::arguments::{
     BuiltinSize, EnvironmentArguments, Precision, SourceArguments, brdf_spelling, brdfs_help,
     environments_help, method_spelling, methods_help, positive, read_brdf, scene_name, size,
 };
-use super::{check_apart, make_way, print, print_json, say_written, to_value};
+use super::{check_apart, check_kept, make_way, print, print_json, say_written, to_value};
 #[cfg(feature = "gpu")]
 use crate::hushed::hushed;
 use crate::tables;
@@ -56,7 +56,8 @@ pub(super) struct Render {
     #[arg(short, long, value_delimiter = ',', value_parser = method_spelling, help = format!("Methods, separated by commas \
         [default: {DEFAULT_METHOD}; displaced, slopes; or a baked map's own]"))]
     method: Vec<String>,
-    /// Render the truth too, with at most this many rays a pixel, and measure against it
+    /// Render the truth too, with this many rays a pixel (a multiple of 32, rounded up), and measure against
+    /// it
     #[arg(long, value_name = "RAYS", num_args = 0..=1, require_equals = true, default_missing_value = "256",
         value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     truth: Option<u32>,
@@ -330,7 +331,9 @@ impl Render {
         {
             return Err(Error::Request(format!("{}: contact sheets are written as .png", sheet.display())));
         }
-        check_apart(self.output.iter().chain(&self.truth_output).chain(&self.compare))?;
+        let outputs = || self.output.iter().chain(&self.truth_output).chain(&self.compare);
+        check_apart(outputs())?;
+        outputs().try_for_each(|path| check_kept(path))?;
         let baked = self.read_baked()?;
         let usual = if self.displace.displace.is_some() { "slopes" } else { DEFAULT_METHOD };
         let own = baked.as_ref().map_or_else(|| usual.to_owned(), |map| map.method.to_string());

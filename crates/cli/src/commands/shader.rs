@@ -10,7 +10,7 @@ use ndfmap::core::ndf::{AnyMethod, DEFAULT_METHOD};
 use ndfmap::gpu::export::{Export, Language, TABLE};
 use serde_json::json;
 
-use super::arguments::{brdf_spelling, brdfs_help, method_spelling, methods_help, read_brdf};
+use super::arguments::{STANDARD, brdf_spelling, brdfs_help, method_spelling, methods_help, read_brdf};
 use super::{make_way, print_bytes, print_json, say_written};
 use ndfmap::Error;
 
@@ -27,9 +27,9 @@ pub(super) struct Shader {
     /// Shading model around the lobe: the factor of Tan et al., of Han et al. or of Smith (tan, han, smith)
     #[arg(long, default_value = "smith", value_parser = ShadingModel::from_str)]
     model: ShadingModel,
-    /// The language
-    #[arg(short, long, default_value = "wgsl", value_parser = language)]
-    lang: &'static str,
+    /// The language [default: that of the output's ending, else wgsl]
+    #[arg(short, long, value_parser = language)]
+    lang: Option<&'static str>,
     /// The file to write [default: stdout]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -58,16 +58,18 @@ impl Shader {
         let method: AnyMethod = self.method.parse()?;
         let lobe = read_brdf(&self.brdf)?;
         let brdf = Brdf { lobe, shading: self.model };
-        let language = find(self.lang).unwrap_or(&TABLE[0]);
+        let output = self.output.as_ref().filter(|path| path.as_os_str() != STANDARD);
+        let ending = output.and_then(|path| Some(path.extension()?.to_str()?.to_owned()));
+        let language = self.lang.or(ending.as_deref()).and_then(find).unwrap_or(&TABLE[0]);
         let bytes = Export { method: &*method, brdf: &brdf }.to(language)?;
-        if let Some(file) = &self.output {
+        if let Some(file) = output {
             make_way(file)?;
             ndfmap::maps::atomic::write(file, &bytes)?;
             say_written(std::slice::from_ref(file));
         }
         if json {
             // Without a file the text goes into the document; a shader that is not text needs a file.
-            let text = if self.output.is_some() { None } else { Some(String::from_utf8(bytes.clone())) };
+            let text = if output.is_some() { None } else { Some(String::from_utf8(bytes.clone())) };
             let text = text.transpose().map_err(|_| {
                 Error::Request(format!("{} is no text: name a file with `-o`", language.name))
             })?;
@@ -82,7 +84,7 @@ impl Shader {
                 "text": text,
             }));
         }
-        if self.output.is_some() {
+        if output.is_some() {
             return Ok(());
         }
         if std::io::stdout().is_terminal() && str::from_utf8(&bytes).is_err() {

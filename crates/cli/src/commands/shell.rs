@@ -17,6 +17,7 @@ const NAME: &str = "ndfmap";
 #[derive(Debug, Args)]
 pub(super) struct Completions {
     /// The shell
+    #[arg(value_enum, ignore_case = true)]
     shell: Shell,
 }
 

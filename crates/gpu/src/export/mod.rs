@@ -86,7 +86,7 @@ pub static TABLE: &[Language] = &[
     },
     Language {
         name: "spirv",
-        aliases: &["spir-v", "vulkan"],
+        aliases: &["spir-v", "spv", "vulkan"],
         summary: "SPIR-V 1.3: a fragment shader `main`, map and sampler at set 0, bindings 0 and 1",
         call: None,
         own_text: false,

@@ -28,6 +28,7 @@ use ndfmap_core::pyramid::{Layout, Precision};
 use ndfmap_core::words;
 use ndfmap_scene::metrics::Picture;
 
+use crate::model::is_model;
 use crate::{Header, Image, MapError, NdfMap};
 
 /// Reads a picture from a whole file.
@@ -156,6 +157,9 @@ pub fn detect(path: &Path, bytes: &[u8]) -> Result<&'static Format, MapError> {
     let names: Vec<&str> = TABLE.iter().map(|f| f.name).collect();
     let reason = match TABLE.iter().find(|f| f.extensions.contains(&extension.as_str())) {
         Some(format) => format!("does not begin like a {} file", format.name),
+        None if is_model(path) => {
+            "is a model: `render --scene` draws it, and `inspect` describes it".to_owned()
+        }
         None => format!("is of no known format; known are {}", names.join(", ")),
     };
     Err(MapError::invalid(path, reason))

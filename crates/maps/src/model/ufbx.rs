@@ -66,7 +66,7 @@ fn read(
         obj_mtl_data: library.to_vec().into(),
         ..LoadOpts::default()
     };
-    let load = |library: &[u8]| ufbx::load_memory(bytes, opts(library));
+    let load = |library: &[u8]| ufbx::load_memory(bytes, opts(library)).map_err(Box::new);
     let scene = load(&library).or_else(|e| {
         if library.is_empty() {
             return Err(e);

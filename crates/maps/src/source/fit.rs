@@ -6,7 +6,7 @@ use glam::DVec2;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::surface::{HeightField, Surface, SurfaceRow, slope_of_normal};
 
-use super::{SourceOptions, read_source};
+use super::{PictureKind, SourceOptions, identify, read_source};
 use crate::formats::{read_file, read_image};
 use crate::{Image, MapError, SourceKind};
 
@@ -41,6 +41,12 @@ pub fn fit_height_scale(
     options: &SourceOptions,
 ) -> Result<HeightFit, MapError> {
     let image = read_image(heights, &read_file(heights)?)?;
+    if identify(heights, &image).kind == PictureKind::Normal {
+        return Err(MapError::unsupported(
+            heights,
+            "is a normal map: it has no heights, whose scale could be fitted",
+        ));
+    }
     let field = gentle_heights(heights, &image, options)?;
     let normal_options = SourceOptions {
         kind: Some(SourceKind::Normal),

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use ndfmap_core::grid::Grid;
-use ndfmap_core::surface::{HeightField, Surface, SurfaceRow, slope_of_normal};
+use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::surface::HeightField;
 
 use super::{DEFAULT_HEIGHT_SCALE, SourceOptions};
 use crate::{Image, MapError, Samples};
@@ -86,15 +86,20 @@ fn check_slopes(
     }
 }
 
-/// Root of the mean of the squares of all slopes, of both axes together.
+/// Root of the mean of the squares of all slopes, of both axes together, however steep.
 fn root_mean_square_slope(field: &HeightField) -> f64 {
-    let size = field.heights.size();
-    let mut row = SurfaceRow::flat(size.width);
+    let Size { width, height } = field.heights.size();
     let mut sum = 0.0;
-    for y in 0..size.height {
-        field.read_row(y, &mut row);
-        let squares = (0..size.width).map(|x| f64::from(slope_of_normal(row.normal(x)).length_squared()));
-        sum += squares.sum::<f64>();
+    for y in 0..height {
+        let line = |dy: isize| field.heights.row(field.wraps.y.index(y as isize + dy, height));
+        let (above, here, below) = (line(-1), line(0), line(1));
+        for x in 0..width {
+            let at = |dx: isize| field.wraps.x.index(x as isize + dx, width);
+            let across = f64::from(here[at(1)] - here[at(-1)]);
+            let down = f64::from(below[x] - above[x]);
+            sum += across * across + down * down;
+        }
     }
-    (sum / size.area() as f64).sqrt()
+    // Central differences over two texels, each 1/width of the map.
+    (sum / (width * height) as f64).sqrt() * width as f64 / 2.0
 }

@@ -153,10 +153,18 @@ pub fn identify(path: &Path, image: &Image) -> Identity {
     }
     let alike = statistics.correlation;
     if named.roughness || alike.is_finite() && alike.abs() < PACKED {
-        let packed = format!("{length}; red and green are {alike:.2} alike, as packed values are");
+        let packed = format!("{length}; {}, as packed values are", alike_words(alike));
         return plain(PictureKind::Roughness, packed);
     }
-    plain(PictureKind::Colour, format!("{length}; red and green are {alike:.2} alike, as colours are"))
+    plain(PictureKind::Colour, format!("{length}; {}", alike_words(alike)))
+}
+
+/// Words for the correlation of red with green.
+fn alike_words(correlation: f64) -> String {
+    match correlation.is_nan() {
+        true => "red or green is the same everywhere".to_owned(),
+        false => format!("red and green correlate by {correlation:.2}"),
+    }
 }
 
 /// Identity of a picture that is taken as normals, whatever it is: the channels that a normal has in it.

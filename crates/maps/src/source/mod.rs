@@ -22,7 +22,7 @@ use self::heights::height_field;
 use self::normals::EncodedNormals;
 use crate::formats::{read_file, read_image, read_image_layer};
 use crate::header::{Source, SourceKind};
-use crate::{Image, MapError};
+use crate::{Image, MapError, Samples};
 
 /// Direction of green in a normal map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -172,13 +172,15 @@ pub fn source_of_image(
                  all the same",
                 other.described()
             );
-            return Err(MapError::unsupported(path, reason));
+            return Err(MapError::NoMap { path: path.to_owned(), reason });
         }
     };
     let file = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let mut source = Source { file, kind, sha256, height_scale: None, convention: None };
     if kind == SourceKind::Height {
-        if options.kind.is_none() && image.channels > 1 && identity.evidence == [identity::GREY_ALONE] {
+        // Of more than 8 bits are heights, not masks.
+        let coarse = matches!(image.samples, Samples::U8(_));
+        if options.kind.is_none() && coarse && identity.evidence == [identity::GREY_ALONE] {
             warnings.push(format!("{}, and is taken as heights", identity::GREY_ALONE));
         }
         if options.convention.is_some() {

@@ -66,7 +66,7 @@ pub fn draw(pages: &Pages<'_>) -> Result<Vec<ReportFile>, Error> {
     let json = serde_json::to_string_pretty(pages.comparison).map_err(|e| Error::Failed(e.to_string()))?;
     let file = |name, bytes| ReportFile { name, bytes };
     let mut files = vec![
-        file("report.html", html.into_bytes()),
+        file(PAGE, html.into_bytes()),
         file("contact-sheet.png", sheet),
         file("ndf.png", disks),
         file("compare.json", (json + "\n").into_bytes()),
@@ -85,10 +85,13 @@ struct Figures<'a> {
     plot: &'a str,
 }
 
+/// Name of the report's page, which holds its pictures.
+pub const PAGE: &str = "report.html";
+
 fn page(pages: &Pages<'_>, figures: &Figures<'_>) -> Result<String, Error> {
     let failed = |e: minijinja::Error| Error::Failed(format!("cannot write the report: {e}"));
     let mut environment = Environment::new();
-    environment.add_template("report.html", include_str!("../../templates/report.html")).map_err(failed)?;
+    environment.add_template(PAGE, include_str!("../../templates/report.html")).map_err(failed)?;
     let comparison = pages.comparison;
     let best: Vec<f64> = (0..comparison.sizes.len())
         .map(|level| comparison.rows.iter().map(|r| r.levels[level].error).fold(f64::INFINITY, f64::min))
@@ -119,11 +122,11 @@ fn page(pages: &Pages<'_>, figures: &Figures<'_>) -> Result<String, Error> {
         })
         .collect();
     let sizes: Vec<String> = comparison.sizes.iter().map(|s| format!("{}×{}", s.width, s.height)).collect();
-    let template = environment.get_template("report.html").map_err(failed)?;
+    let template = environment.get_template(PAGE).map_err(failed)?;
     template
         .render(context! {
             map => pages.source.file.clone(),
-            lobe => comparison.brdf.clone(),
+            brdf => comparison.brdf.clone(),
             size => sizes.first(),
             sizes => sizes,
             rows => rows,

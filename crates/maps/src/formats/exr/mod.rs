@@ -123,10 +123,7 @@ pub(super) fn read_layer(path: &Path, bytes: &[u8], layer: Option<&str>) -> Resu
     check_header(path, bytes)?;
     let meta = metadata(path, bytes)?;
     if header_text(&meta).is_some() || has_bumpslopes(&meta) {
-        return Err(MapError::unsupported(
-            path,
-            "is already a baked map: `inspect` reads it, and `compare MAP --baked FILE` measures it",
-        ));
+        return Err(MapError::baked(path));
     }
     let image = guarded(path, || {
         let reader = read().no_deep_data().largest_resolution_level().all_channels();

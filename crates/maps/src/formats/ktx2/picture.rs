@@ -22,10 +22,7 @@ const SWIZZLE: &str = "KTXswizzle";
 pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Image, MapError> {
     let file = Container::new(path, bytes)?;
     if file.value(KEY)?.is_some() {
-        return Err(MapError::unsupported(
-            path,
-            "is already a baked map: `inspect` reads it, and `compare MAP --baked FILE` measures it",
-        ));
+        return Err(MapError::baked(path));
     }
     let header = &file.header;
     let kind = match (header.pixel_depth, header.face_count, header.layer_count) {
