@@ -47,11 +47,18 @@ mod tests {
     }
 
     #[test]
+    fn roughness_is_the_root_of_alpha() {
+        let lobe = |spelling: &str| spelling.parse::<AnyLobe>().unwrap().to_string();
+        assert_eq!(lobe("roughness:0.5"), "ggx:0.25");
+        assert_eq!(lobe("GGX:0.25"), "ggx:0.25");
+    }
+
+    #[test]
     fn bad_spellings_say_why() {
         let message = |s: &str| s.parse::<AnyLobe>().unwrap_err().to_string();
         assert_eq!(message("phong:3"), "there is no BRDF called `phong`");
         assert_eq!(message("ggx:2"), "BRDF `ggx:2`: alpha must be between 0.0001 and 1, not 2");
-        assert_eq!(message("ggx"), "BRDF `ggx`: a number must follow, as in `name:0.5`");
+        assert_eq!(message("ggx"), "BRDF `ggx`: ALPHA must follow, as in `ggx:0.1`");
         assert_eq!(message("ggx:x"), "BRDF `ggx:x`: `x` is no number");
         assert_eq!(
             message("blinn-phong:NaN"),

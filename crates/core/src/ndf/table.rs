@@ -115,3 +115,17 @@ impl FromStr for AnyMethod {
             .map_err(|reason| ParseMethodError::Parameter { spelling: spelling.to_owned(), reason })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_known_as_people_write_them() {
+        let method = |spelling: &str| spelling.parse::<AnyMethod>().unwrap().to_string();
+        assert_eq!(method("LEADR"), "slopes");
+        assert_eq!(method("Lean:9"), "slopes:9");
+        assert_eq!(method("VMF:4:Unaligned"), "vmf:4:unaligned");
+        assert_eq!(method(DEFAULT_METHOD), DEFAULT_METHOD);
+    }
+}
