@@ -104,9 +104,14 @@ impl MetalRough {
 impl Factors {
     /// Surface parameters under texture values, and the roughness (glTF 2.0, appendix B).
     fn params(&self, base: [f32; 4], metal_rough: [f32; 4]) -> (SurfaceParams, f64) {
-        let base = DVec3::from([0, 1, 2].map(|i| f64::from(self.base[i] * base[i])));
-        let metal = f64::from(self.metallic * metal_rough[2]).clamp(0.0, 1.0);
-        let roughness = f64::from(self.roughness * metal_rough[1]).clamp(LEAST_ROUGHNESS, 1.0);
+        // Factors of files may be no numbers; then textures stand alone.
+        let product = |factor: f32, texture: f32| match f64::from(factor) * f64::from(texture) {
+            v if v.is_finite() => v,
+            _ => f64::from(texture),
+        };
+        let base = DVec3::from([0, 1, 2].map(|i| product(self.base[i], base[i])));
+        let metal = product(self.metallic, metal_rough[2]).clamp(0.0, 1.0);
+        let roughness = product(self.roughness, metal_rough[1]).clamp(LEAST_ROUGHNESS, 1.0);
         let alpha = PerceptualRoughness::new(roughness).map(Alpha::from);
         let variance = alpha.map_or(SlopeVariance::ZERO, SlopeVariance::from);
         let params = SurfaceParams {

@@ -293,7 +293,9 @@ impl RawMesh {
         if self.uvs.iter().any(|uv| !uv.is_finite()) {
             return Err(MapError::invalid(path, "has map coordinates that are not finite"));
         }
-        let normals = self.normals.iter().map(|n| n.try_normalize().unwrap_or(Vec3::Y)).collect();
+        // In double precision: single ones overflow at lengths that files may have.
+        let unit = |n: &Vec3| n.as_dvec3().try_normalize().map_or(Vec3::Y, |n| n.as_vec3());
+        let normals = self.normals.iter().map(unit).collect();
         self.normals = normals;
         if self.tangents.is_empty() {
             return Ok(with_tangents(&self));
@@ -301,7 +303,8 @@ impl RawMesh {
         let vertex = |i: usize| Vertex {
             position: self.positions[i],
             normal: self.normals[i],
-            tangent: across(self.tangents[i].truncate(), self.normals[i]).extend(self.tangents[i].w.signum()),
+            tangent: across(self.tangents[i].truncate(), self.normals[i])
+                .extend(if self.tangents[i].w < 0.0 { -1.0 } else { 1.0 }),
             uv: self.uvs[i],
         };
         Ok(Mesh {
