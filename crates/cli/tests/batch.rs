@@ -116,3 +116,21 @@ fn nothing_in_view_is_no_perfect_picture() {
     let (status, _, said) = outcome(&words);
     assert!(status == 2 && said.contains("nothing is in view"), "{said}");
 }
+
+#[test]
+fn options_that_do_nothing_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = text(&folder.path().join("a.ktx2"));
+    json(&["bake", "builtin:foil", "--map-size", "8", &file, "--json"]);
+    let picture = text(&folder.path().join("a.exr"));
+    let scene =
+        ["render", "--scene", "sphere", "--map-size", "8", "--size", "4", "--device", "cpu", "-o", &picture];
+    for (words, said) in [
+        (vec!["inspect", &file, "--convention", "opengl"], "options for the reading of pictures do nothing"),
+        ([&scene[..], &["--map", &file, "--from", "height"]].concat(), "reading of pictures do nothing"),
+        ([&scene[..], &["--tone", "reinhard"]].concat(), "`--tone` does nothing"),
+    ] {
+        let (status, _, stderr) = outcome(&words);
+        assert!(status == 0 && stderr.contains(said), "{words:?}: {stderr}");
+    }
+}

@@ -56,7 +56,7 @@ fn a_scene_is_rendered() {
 #[test]
 fn a_shader_is_exported() {
     let folder = tempfile::tempdir().unwrap();
-    for (language, word) in [("glsl-es", "precision highp float;"), ("wgsl", "fn ndf_brdf() -> Brdf")] {
+    for (language, word) in [("glsl-es", "precision highp float;"), ("wgsl", "fn ndf_brdf() -> ndf_Brdf")] {
         let text = run("export_a_shader", folder.path(), &[language]);
         assert!(text.contains(word), "{language}: {text}");
     }

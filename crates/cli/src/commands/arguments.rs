@@ -78,7 +78,7 @@ enum From {
     Height,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum ConventionArgument {
     Auto,
     Opengl,
@@ -103,7 +103,7 @@ impl FromStr for HeightScale {
     }
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum FilterArgument {
     Central,
     Sobel,
@@ -112,6 +112,21 @@ enum FilterArgument {
 }
 
 impl SourceArguments {
+    /// Warns where options say how to read a picture, of a file that is none.
+    pub(super) fn warn_if_given(&self, file: &Path, what: &str) {
+        let given = self.layer.is_some()
+            || self.from.is_some()
+            || self.convention != ConventionArgument::Auto
+            || self.height_scale.is_some()
+            || self.normal_map.is_some()
+            || self.invert
+            || self.slope_filter != FilterArgument::Central
+            || self.wrap != Wraps::default();
+        if given {
+            warn(file, &format!("is {what}: options for the reading of pictures do nothing"));
+        }
+    }
+
     /// Reads the map, at a height scale that fits the normal map beside it where that is asked for.
     pub(super) fn read(&self, map: &Path, builtin: &BuiltinSize) -> Result<SourceMap, Error> {
         let options = self.fitted(map, builtin)?;

@@ -41,8 +41,12 @@ impl Inspect {
                 })?;
                 to_value(&inspect::describe_texel(&self.file, &map, place)?)?
             }
-            (Some(map), None) => to_value(&inspect::describe_map(&map))?,
+            (Some(map), None) => {
+                self.source.warn_if_given(&self.file, "a baked map");
+                to_value(&inspect::describe_map(&map))?
+            }
             (None, _) if is_model(&self.file) => {
+                self.source.warn_if_given(&self.file, "a model");
                 let report = inspect::describe_model(&self.file)?;
                 report.warnings.iter().for_each(|warning| warn(&self.file, warning));
                 to_value(&report)?

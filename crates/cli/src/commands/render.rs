@@ -331,6 +331,10 @@ impl Render {
         {
             return Err(Error::Request(format!("{}: contact sheets are written as .png", sheet.display())));
         }
+        let linear = |path: &PathBuf| matches!(picture_writer(path), Ok(WritePicture::Linear(_)));
+        if let Some(path) = self.output.as_ref().filter(|path| self.tone != Tone::Clip && linear(path)) {
+            warn(path, "holds linear light: `--tone` does nothing");
+        }
         let outputs = || self.output.iter().chain(&self.truth_output).chain(&self.compare);
         check_apart(outputs())?;
         outputs().try_for_each(|path| check_kept(path))?;
@@ -437,6 +441,7 @@ impl Render {
         let file = |path: &&Path| !path.to_str().is_some_and(|p| p.starts_with(BUILTIN_PREFIX));
         let Some(path) = self.map.as_deref().filter(file) else { return Ok(None) };
         let Some(map) = read_ndf(path, &read_file(path)?)? else { return Ok(None) };
+        self.source.warn_if_given(path, "a baked map");
         if !map.header.attributes.is_empty() {
             warn(path, "the attributes that its lobes carry are not used: scenes bring their own colours");
         }
