@@ -46,7 +46,7 @@ def read(path):
     return levels
 
 
-def compare(ndfmap, folder, source, precision, options, oiio_options, convention=()):
+def compare(ndfmap, folder, source, precision, options, oiio_options, convention=("--convention", "opengl")):
     theirs, ours = os.path.join(folder, "oiio.exr"), os.path.join(folder, "ours.exr")
     maketx = os.path.join(os.path.dirname(sys.executable), "maketx")
     kind = {"half": "half", "single": "float"}[precision]

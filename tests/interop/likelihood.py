@@ -93,7 +93,7 @@ def main():
                 for method in ("gmm", "vmf"):
                     file = Path(folder) / "map.ktx2"
                     spelling = f"{method}:{LOBES}:unaligned"
-                    run(program, "bake", picture, "-o", file, "-m", spelling, "--precision", "single")
+                    run(program, "bake", picture, "-o", file, "-m", spelling, "--precision", "single", "--from", "normal", "--convention", "opengl")
                     ours, theirs, seconds = [], [], 0.0
                     for _ in range(blocks):
                         x, y = rng.integers(SIDE // block, size=2)

@@ -88,9 +88,9 @@ def theirs(folder, distribution, alpha, light, seed):
 
 def ours(program, folder, lobe, light):
     picture = folder / "ours.exr"
-    words = [program, "render", "--scene", "v-groove", "--map", folder / "ours.png", "--size", str(SIDE), "--brdf", lobe]
+    words = [program, "render", "--scene", "v-groove", "--map", folder / "ours.png", "--from", "normal", "--convention", "opengl", "--size", str(SIDE), "--brdf", lobe]
     words += ["--model", "smith", "--diffuse", "0", "--specular", "1", "--light", ",".join(map(str, light)) + ":1"]
-    words += ["--method", "naive", "--truth", str(2 * SAMPLES), "--truth-output", picture, "--json"]
+    words += ["--method", "naive", f"--truth={2 * SAMPLES}", "--truth-output", picture, "--json"]
     told = json.loads(subprocess.run(list(map(str, words)), check=True, capture_output=True).stdout)
     return np.array(mi.Bitmap(str(picture)))[..., 0], told["truth"]["noise"]
 

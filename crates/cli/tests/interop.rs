@@ -100,6 +100,7 @@ fn ktx2_files_open_in_an_independent_reader() {
             precision,
             "-o",
             &file,
+            "--zstd=0",
             "--json",
         ]);
         let output =
