@@ -1,4 +1,4 @@
-//! What the targets share.
+//! Common parts of the targets.
 
 use std::panic::{set_hook, take_hook};
 use std::path::Path;

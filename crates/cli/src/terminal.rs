@@ -68,7 +68,8 @@ impl Work {
 
 fn bar(name: &str) -> ProgressBar {
     let bar = ProgressBar::new(STEPS);
-    // What remains, were the rest as fast as what is done: it counts down with the clock, not with progress.
+    // Time that remains, were the rest as fast as the part that is done: it counts down with the clock, not
+    // with progress.
     let remaining = |state: &ProgressState, out: &mut dyn std::fmt::Write| {
         let done = state.pos() as f64 / STEPS as f64;
         let _shown = match (state.elapsed().as_secs_f64(), done) {

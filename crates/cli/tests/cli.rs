@@ -200,7 +200,7 @@ fn auto_chooses_by_measuring_and_says_why() {
     assert_eq!(json(&["inspect", &file, "--json"])["method"], chosen["method"]);
     let (status, _, said) = outcome(&[&base[..], &["--max-error", "1e-9"]].concat());
     assert!(status == 1 && said.contains("no method's error is at most"), "{said}");
-    // What was measured is not lost.
+    // The table that was measured is not lost.
     assert!(said.contains("toksvig ") && said.contains("bytes a texel"), "{said}");
     let (status, _, said) = outcome(&[&base[..], &["--bytes-per-texel", "4"]].concat());
     assert!(

@@ -28,7 +28,7 @@ pub enum MapError {
     NoMap {
         /// The file.
         path: PathBuf,
-        /// What it looks like, and why.
+        /// Kind that it looks like, and the evidence.
         reason: String,
     },
     /// The file is sound, but of a kind that cannot be used here.

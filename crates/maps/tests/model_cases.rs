@@ -32,7 +32,7 @@ struct Hit<'a> {
     normal: Vec3,
 }
 
-/// What lies under (x, y), seen along z.
+/// Hit under (x, y), seen along z.
 fn hit(scene: &Scene, at: Vec2) -> Option<Hit<'_>> {
     for object in &scene.objects {
         for triangle in &object.mesh.triangles {

@@ -27,7 +27,7 @@ const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\npr
     property float s\nproperty float t\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
     -1 -1 0 0 0\n1 -1 0 1 0\n1 1 0 1 1\n-1 1 0 0 1\n4 0 1 2 3\n";
 
-/// The same square as FBX.
+/// Square of the same kind, as FBX.
 const FBX: &str = r#"; FBX 7.4.0 project file
 FBXHeaderExtension: { FBXHeaderVersion: 1003
  FBXVersion: 7400 }

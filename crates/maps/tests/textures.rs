@@ -35,7 +35,7 @@ fn source(name: &str) -> SourceMap {
     read_source(&case(name), &green_up()).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// What is said of bytes that are refused.
+/// Message about bytes that are refused.
 fn refused(name: &str, bytes: &[u8]) -> String {
     match read_image(Path::new(name), bytes) {
         Ok(_) => panic!("{name} was read"),

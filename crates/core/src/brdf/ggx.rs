@@ -34,7 +34,7 @@ pub(super) const ROW: Row = Row {
     samples: &["ggx:0.1", "ggx:0.4"],
 };
 
-/// The same lobe, by the number of material editors.
+/// GGX by the number of material editors.
 pub(super) const ROUGHNESS: Row = Row {
     name: "roughness",
     parameter: ":R",

@@ -71,7 +71,7 @@ impl CornerMesh {
 
 #[cfg(feature = "gltf")]
 impl RawMesh {
-    /// The same mesh, every triangle as flat as it lies.
+    /// Mesh whose every triangle is as flat as it lies.
     pub(super) fn faceted(self) -> Self {
         let uvs = match self.uvs.is_empty() {
             true => Vec::new(),

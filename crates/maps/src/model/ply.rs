@@ -224,7 +224,7 @@ fn polygon(positions: &[Vec3]) -> Vec<[usize; 3]> {
     cut.into_iter().map(|[a, b, c]| if against { [a, c, b] } else { [a, b, c] }).collect()
 }
 
-/// The same file as the crate can read it: lines that end with a line feed, begin with a word and are not
+/// File as the crate can read it: lines that end with a line feed, begin with a word and are not
 /// blank, single blanks between words, and nothing but ASCII in the header.
 fn tidied(bytes: &[u8]) -> Cow<'_, [u8]> {
     const END: &[u8] = b"end_header";

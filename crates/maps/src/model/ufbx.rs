@@ -231,7 +231,7 @@ struct Look<'a> {
 }
 
 impl Look<'_> {
-    /// What the library makes of it in metalness and roughness; a plain one where the file says nothing.
+    /// Material in metalness and roughness, as the library makes it; a plain one where the file says nothing.
     fn read(&self, warnings: &mut Vec<String>) -> Result<Material, MapError> {
         let (pbr, fbx) = (&self.material.pbr, &self.material.fbx);
         let name = self.material.element.name.to_string();

@@ -352,7 +352,7 @@ impl Statistics {
     }
 }
 
-/// What a file's name says it holds.
+/// Content of a file, as its name says it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Named {
     height: bool,

@@ -101,7 +101,7 @@ fn packed<const WIDTH: usize>(stream: &mut Stream<'_>, group: &mut [u8; GROUP]) 
     Ok(())
 }
 
-/// How a channel's elements differ from those before.
+/// Difference of a channel's elements from those before.
 #[derive(Clone, Copy)]
 enum Delta {
     /// Zigzag codes of four differences of bytes.

@@ -50,7 +50,7 @@ enum Filter {
     Color,
 }
 
-/// What a compressed view holds.
+/// Content of a compressed view.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Layout {
@@ -104,7 +104,7 @@ impl Layout {
 }
 
 impl Filter {
-    /// What is done to the bytes of an element.
+    /// Filter of the bytes of an element.
     fn function(self) -> Option<fn(&mut [u8])> {
         match self {
             Self::None => None,

@@ -1,6 +1,6 @@
 //! Bytes of a compressed stream, read from the front.
 
-/// What is wrong with a stream: the end of a sentence about it.
+/// Fault of a stream: the end of a sentence about it.
 pub(super) type Damage = &'static str;
 
 pub(super) const TRUNCATED: Damage = "ends too early";

@@ -14,7 +14,7 @@ struct Case {
     name: String,
     layout: Layout,
     stream: String,
-    /// What another decoder reads: all of it, or its hash.
+    /// Bytes that another decoder reads: all of them, or their hash.
     values: Option<String>,
     sha256: Option<String>,
 }
