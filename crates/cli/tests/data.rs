@@ -99,7 +99,8 @@ fn heights_take_the_scale_of_the_normal_map_beside_them() {
         assert_eq!(status, 0, "{said}");
         assert!(said.contains("fits the normal map"), "{said}");
         let baked: Value = serde_json::from_str(&stdout).unwrap();
-        // The finest level's one-texel means of slopes: the variances agree to the noise of 8 bits and JPEG.
+        // Measured: 0.06, 0.26 and 0.08 apart in the logarithm. The scale is fitted at the size where the
+        // maps agree most; the finest slopes have the noise of 8 bits and of JPEG besides, most for the rock.
         let variance = |file: &str, words: &[&str]| {
             let told = json(&[&["inspect", file, "--json"], words].concat());
             told["slope_variance"][0].as_f64().unwrap()
@@ -107,7 +108,7 @@ fn heights_take_the_scale_of_the_normal_map_beside_them() {
         let scale = said.split("height scale ").nth(1).unwrap().split(' ').next().unwrap().to_owned();
         let own = variance(&text(&data.join("height").join(height)), &["--height-scale", &scale]);
         let due = variance(&text(&data.join("normal").join(normal)), &[]);
-        assert!((own / due).ln().abs() < 0.5, "{height} {own} {due}");
+        assert!((own / due).ln().abs() < 0.3, "{height} {own} {due}");
         assert_eq!(baked["method"], "vmf:2");
     }
     let (status, _, said) = bake("godot_wool_depth.png", "ambientcg_Rock058_normal.jpg");

@@ -50,9 +50,10 @@ fn cubes_are_read() {
         let (sky, _) = read_environment(&cases.join(name)).unwrap();
         for (w, channel) in [(DVec3::X, 0), (DVec3::NEG_Z, 2), (DVec3::Y, 1)] {
             let w = w * DVec3::new(turn, 1.0, turn);
-            // Half floats hold 8 exactly; other ways have 0.1 or less.
+            // Half floats hold 8 exactly, and 0.1, which is the most of other ways, to a thousandth of
+            // itself.
             assert_eq!(sky.radiance(w)[channel], 8.0, "{name} {w}");
-            assert!(sky.radiance(-w)[channel] < 0.2, "{name} {w}");
+            assert!(sky.radiance(-w)[channel] < 0.101, "{name} {w}");
         }
     }
 }

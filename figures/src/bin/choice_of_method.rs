@@ -26,6 +26,9 @@ const LOBE: &str = "roughness:0.45";
 struct Measures {
     at: f64,
     between: f64,
+    /// Error of level 0, the map itself.
+    finest: f64,
+    bake_seconds: f64,
 }
 
 impl Measures {
@@ -33,7 +36,12 @@ impl Measures {
         let mean = |errors: Vec<f64>| errors.iter().sum::<f64>() / errors.len().max(1) as f64;
         let at = row.levels.iter().filter(|e| LEVELS.contains(&e.level)).map(|e| e.error);
         let between = row.filtering.iter().filter(|e| LEVELS.contains(&e.level)).map(|e| e.filtered);
-        Self { at: mean(at.collect()), between: mean(between.collect()) }
+        Self {
+            at: mean(at.collect()),
+            between: mean(between.collect()),
+            finest: row.levels[0].error,
+            bake_seconds: row.bake_seconds,
+        }
     }
 }
 
@@ -86,7 +94,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     println!("{} maps, {lobe}, levels {} to {}", all.len(), LEVELS.start(), LEVELS.end());
-    println!("method    bytes   texels  between   of toksvig's: texels  between  worst  better on");
+    println!(
+        "method    bytes   texels  between   of toksvig's: texels  between  worst  better on  level 0  bake s"
+    );
     for (at, method) in METHODS.iter().enumerate() {
         let measures: Vec<Measures> = all.iter().map(|c| Measures::of(&c.rows[at])).collect();
         let base: Vec<Measures> = all.iter().map(|c| Measures::of(&c.rows[0])).collect();
@@ -95,7 +105,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         };
         let between = ratios(|m| m.between);
         println!(
-            "{method:9} {:>5}  {:>7.3}  {:>7.3}  {:>21.3}  {:>7.3}  {:>5.2}  {:>3} of {}",
+            "{method:9} {:>5}  {:>7.3}  {:>7.3}  {:>21.3}  {:>7.3}  {:>5.2}  {:>3} of {}  {:>8.4}  {:>6.2}",
             all.first().map_or(0, |c| c.rows[at].bytes_per_texel),
             median(measures.iter().map(|m| m.at).collect()),
             median(measures.iter().map(|m| m.between).collect()),
@@ -103,7 +113,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             median(between.clone()),
             between.iter().copied().fold(0.0, f64::max),
             between.iter().filter(|ratio| **ratio < 1.0).count(),
-            between.len()
+            between.len(),
+            median(measures.iter().map(|m| m.finest).collect()),
+            median(measures.iter().map(|m| m.bake_seconds).collect())
         );
     }
     Ok(())

@@ -30,11 +30,11 @@ pub(super) struct Inspect {
 
 impl Inspect {
     pub(super) fn run(self, json: bool) -> Result<(), Error> {
-        let name = self.file.display();
-        if self.texel.is_some() && self.baked()?.is_none() {
-            return Err(Error::Request(format!("{name}: is no baked map: it has no texels to decode")));
-        }
         let value = match (self.baked()?, &self.texel) {
+            (None, Some(_)) => {
+                let why = "is no baked map: it has no texels to decode";
+                return Err(Error::Request(format!("{}: {why}", self.file.display())));
+            }
             (Some(map), Some(texel)) => {
                 let place: [usize; 3] = texel[..].try_into().map_err(|_| {
                     Error::Request("--texel takes three numbers: level, column, row".to_owned())

@@ -21,8 +21,8 @@ pub struct HeightFit {
     pub correlation: f64,
 }
 
-/// Least correlation of maps that belong together: one and the same surface has 0.6 and more through 8 bits
-/// and JPEG, two surfaces at most 0.1.
+/// Least correlation of maps that belong together: real pairs have 0.55 and more through 8 bits and JPEG, two
+/// surfaces at most 0.15.
 const TOGETHER: f64 = 0.3;
 
 /// Smallest side at which slopes are compared: fewer would agree by chance.

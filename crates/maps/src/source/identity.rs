@@ -1,6 +1,6 @@
 //! Identity of a picture: normals, heights, roughness, colours or light, by what its texels and its name say.
 //!
-//! Thresholds stand between what maps and colours measure: 51 pictures of eleven makers, `docs/pictures.md`.
+//! Thresholds stand between the measures of real maps and of real colours: `docs/pictures.md`.
 
 use std::path::Path;
 

@@ -25,7 +25,7 @@ pub struct ConventionEvidence {
     pub leans: bool,
 }
 
-/// Least size of an integrability that tells the convention. Maps whose convention is known have 0.41 and
+/// Least size of an integrability that tells the convention. Maps whose convention is known have 0.39 and
 /// more; those that tell nothing at most 0.22 (linen).
 const CLEAR: f64 = 0.25;
 
