@@ -352,6 +352,92 @@ fn colours_without_a_normal_map_lie_by_their_own_transform() {
     assert_eq!(surface.wraps().x, ndfmap_core::surface::Wrap::Clamp);
 }
 
+/// The square of [`gltf`] with transforms of its normal map and of its colours.
+fn transformed(normals: &serde_json::Value, colours: &serde_json::Value) -> Vec<u8> {
+    changed(|json| {
+        let material = &mut json["materials"][0];
+        material["normalTexture"]["extensions"] = serde_json::json!({ "KHR_texture_transform": normals });
+        material["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] =
+            serde_json::json!({ "KHR_texture_transform": colours });
+        json["extensionsUsed"] = serde_json::json!(["KHR_texture_transform"]);
+    })
+}
+
+#[test]
+fn textures_lie_each_by_its_own_transform() {
+    use serde_json::json;
+    let none = json!({});
+    // Transforms of normals and colours; width and height of the map; the map's scale on the mesh; red of its
+    // first row, x of its first row's normals: 0 where flat, 1 where steep.
+    let cases: [(_, _, _, _, &[u8], &[u8]); 5] = [
+        (none.clone(), none.clone(), (2, 1), 1.0, &[1, 0], &[0, 1]),
+        // Colours that repeat more often are averaged over the texels of the normal map.
+        (none.clone(), json!({ "offset": [0.5, 0.0] }), (2, 1), 1.0, &[0, 1], &[0, 1]),
+        // Normals that repeat more often: the map is the colours', with the normals side by side.
+        (json!({ "scale": [2, 2] }), none.clone(), (4, 2), 1.0, &[1, 1, 0, 0], &[0, 1, 0, 1]),
+        // Neither is a whole multiple of the other, both are of the plain coordinates.
+        (
+            json!({ "scale": [3, 1] }),
+            json!({ "scale": [2, 1] }),
+            (6, 1),
+            1.0,
+            &[1, 2, 0, 1, 2, 0],
+            &[0, 1, 0, 1, 0, 1],
+        ),
+        // A texture that lies twice as wide as the coordinates are: both go by its own.
+        (json!({ "scale": [0.5, 1] }), none, (2, 1), 0.5, &[2, 2], &[0, 1]),
+    ];
+    for (normals, colours, (width, height), scale, red, steep) in cases {
+        let (scene, warnings) = read("a.gltf", &transformed(&normals, &colours)).unwrap();
+        let said = format!("{normals} {colours} {warnings:?}");
+        assert!(warnings.iter().all(|w| !w.contains("go on together")), "{said}");
+        let (plain, _) = read("a.gltf", &gltf()).unwrap();
+        for (a, b) in plain.objects[0].mesh.vertices.iter().zip(&scene.objects[0].mesh.vertices) {
+            assert!((a.uv.x * scale - b.uv.x).abs() < 1e-6, "{said}: {} {}", a.uv, b.uv);
+        }
+        let material = &scene.materials[scene.objects[0].material];
+        assert_eq!((material.map.size().width, material.map.size().height), (width, height), "{said}");
+        let mut row = ndfmap_core::surface::SurfaceRow::flat(width);
+        material.map.read_row(0, &mut row);
+        let found: Vec<u8> = (0..width).map(|x| u8::from(row.normal(x).x > 0.1)).collect();
+        assert_eq!(found, steep, "{said}");
+        // Half of the red, 0.375 of a diffuse 0.75, counts as 2.
+        let texels = material.textures.as_ref().unwrap().diffuse_roughness.row(0);
+        let found: Vec<u8> = texels.iter().map(|t| [0, 2, 1][(t[0] / 0.375).round() as usize]).collect();
+        assert_eq!(found, red, "{said}");
+    }
+}
+
+#[test]
+fn textures_of_an_obj_lie_by_their_scale_and_offset() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
+    write("n.png", &two_texels(&[128, 128, 255, 218, 128, 218]));
+    write("c.png", &two_texels(&[255, 0, 0, 0, 0, 255]));
+    write("a.obj", format!("mtllib a.mtl\nusemtl first\n{OBJ}").as_bytes());
+    for (laid, uv) in [
+        ("", Vec2::new(1.0, 0.0)),
+        ("-s 2 3 1 -o 0.25 0 0 ", Vec2::new(2.25, -2.0)),
+        ("-s 2 ", Vec2::new(2.0, 0.0)),
+        ("-o 0.5 0.25 ", Vec2::new(1.5, -0.25)),
+    ] {
+        write("a.mtl", format!("newmtl first\nPm 0\nmap_Kd {laid}c.png\n").as_bytes());
+        let (scene, warnings) = read_model(&folder.path().join("a.obj"), &options()).unwrap();
+        assert_eq!(warnings, [] as [&str; 0], "{laid}");
+        // The corner at the upper right, of coordinates (1, 0) with v down.
+        let corner = scene.objects[0].mesh.vertices.iter().find(|v| v.position.x > 0.0 && v.position.y > 0.0);
+        assert!((corner.unwrap().uv - uv).length() < 1e-6, "{laid}: {}", corner.unwrap().uv);
+    }
+    // Normals that repeat twice beside colours that do not; clamped colours do not go on with them.
+    for (clamp, width, said) in [("", 4, 0), ("-clamp on ", 2, 1)] {
+        let text = format!("newmtl first\nPm 0\nmap_Kd {clamp}c.png\nmap_Bump -s 2 1 1 n.png\n");
+        write("a.mtl", text.as_bytes());
+        let (scene, warnings) = read_model(&folder.path().join("a.obj"), &options()).unwrap();
+        let material = &scene.materials[scene.objects[0].material];
+        assert_eq!((material.map.size().width, warnings.len()), (width, said), "{warnings:?}");
+    }
+}
+
 #[test]
 fn what_is_laid_on_otherwise_or_left_out_is_said() {
     let warned = |change: fn(&mut serde_json::Value), reason: &str| {
@@ -359,10 +445,10 @@ fn what_is_laid_on_otherwise_or_left_out_is_said() {
         assert!(warnings.iter().any(|w| w.contains(reason)), "{reason}: {warnings:?}");
     };
     let other = |json: &mut serde_json::Value| {
-        let extension = serde_json::json!({ "KHR_texture_transform": { "offset": [0.5, 0] } });
+        let extension = serde_json::json!({ "KHR_texture_transform": { "scale": [2.5, 1] } });
         json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = extension;
     };
-    warned(other, "do not lie alike");
+    warned(other, "do not go on together");
     let coloured = |json: &mut serde_json::Value| {
         json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 0.into();
     };

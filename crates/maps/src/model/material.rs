@@ -6,12 +6,13 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 use ndfmap_core::brdf::SurfaceParams;
 use ndfmap_core::grid::{Grid, Size};
-use ndfmap_core::lookup::area_mean;
-use ndfmap_core::surface::{NormalGrid, Surface, SurfaceRow, Wraps};
+use ndfmap_core::surface::{NormalGrid, Surface, SurfaceRow};
 use ndfmap_core::units::{Alpha, PerceptualRoughness, SlopeVariance};
 use ndfmap_scene::{Material, SurfaceTextures};
 
+use super::laying::Arranged;
 use super::microfacets;
+use super::relay::Laid;
 use crate::attribute::{Transfer, attribute_of_image};
 use crate::{Image, MapError};
 
@@ -30,25 +31,26 @@ pub(super) struct Factors {
     pub(super) roughness: f32,
 }
 
-/// Metallic-roughness material of a file: factors, and textures that all lie on the mesh alike.
+/// Metallic-roughness material of a file: factors and textures.
 pub(super) struct MetalRough {
     pub(super) name: String,
     pub(super) factors: Factors,
-    /// Normals; `None` for a flat surface.
-    pub(super) normals: Option<Arc<dyn Surface>>,
-    /// Base colour, linear.
-    pub(super) base: Option<Grid<[f32; 4]>>,
-    /// Roughness in the second channel, metalness in the third.
-    pub(super) metal_rough: Option<Grid<[f32; 4]>>,
-    /// Wraps of the textures, where there are no normals to say.
-    pub(super) wraps: Wraps,
+    pub(super) textures: Arranged,
 }
 
 impl MetalRough {
     /// The material that it is shaded as; colours are averaged over the texels of the normal map.
     pub(super) fn into_material(self, warnings: &mut Vec<String>) -> Material {
+        if !self.textures.faithful {
+            warnings.push(format!(
+                "textures of `{}` lie in ways that do not go on together (other coordinates or edges, or \
+                 scales that are no whole multiples): all are laid on as its normal map, or without one as \
+                 its colours",
+                self.name
+            ));
+        }
         let surface = self.surface(warnings);
-        let Self { name, factors, base, metal_rough, .. } = self;
+        let Self { name, factors, textures: Arranged { base, metal_rough, .. } } = self;
         if base.is_none() && metal_rough.is_none() {
             let (params, roughness) = factors.params([1.0; 4], [1.0; 4]);
             let params = SurfaceParams { roughness: SlopeVariance::ZERO, ..params };
@@ -62,9 +64,8 @@ impl MetalRough {
             };
         }
         let size = surface.size();
-        let sample = |map: &Option<Grid<[f32; 4]>>, x: usize, y: usize| {
-            map.as_ref().map_or([1.0; 4], |map| area_mean(map, size, x, y))
-        };
+        let sample =
+            |map: &Option<Laid>, x: usize, y: usize| map.as_ref().map_or([1.0; 4], |map| map.at(size, x, y));
         let at = |x: usize, y: usize| factors.params(sample(&base, x, y), sample(&metal_rough, x, y)).0;
         let rgb = |c: DVec3, w: f64| [c.x as f32, c.y as f32, c.z as f32, w as f32];
         let diffuse_roughness = Grid::from_fn(size, |x, y| {
@@ -83,18 +84,19 @@ impl MetalRough {
 
     /// Normals at a size that holds the colours: a placeholder, however small, is as flat at theirs.
     fn surface(&self, warnings: &mut Vec<String>) -> Arc<dyn Surface> {
-        let colours = self.base.as_ref().or(self.metal_rough.as_ref()).map(Grid::size);
-        let constant = |normal: Vec3, size: Size, wraps: Wraps| -> Arc<dyn Surface> {
-            Arc::new(NormalGrid { normals: Grid::from_fn(size, |_, _| normal), wraps })
+        let Arranged { normals, base, metal_rough, laying, .. } = &self.textures;
+        let colours = base.as_ref().or(metal_rough.as_ref()).map(Laid::size);
+        let constant = |normal: Vec3, size: Size| -> Arc<dyn Surface> {
+            Arc::new(NormalGrid { normals: Grid::from_fn(size, |_, _| normal), wraps: laying.wraps })
         };
-        let Some(normals) = &self.normals else {
-            return constant(Vec3::Z, colours.unwrap_or(Size { width: 1, height: 1 }), self.wraps);
+        let Some(normals) = normals else {
+            return constant(Vec3::Z, colours.unwrap_or(Size { width: 1, height: 1 }));
         };
         let Some(size) = colours.filter(|size| size.area() > normals.size().area()) else {
             return normals.clone();
         };
         if let Some(normal) = only_normal(&**normals) {
-            return constant(normal, size, normals.wraps());
+            return constant(normal, size);
         }
         warnings.push(format!("colours of `{}` are averaged over its smaller normal map", self.name));
         normals.clone()
@@ -136,7 +138,7 @@ fn mean_params(diffuse_roughness: &Grid<[f32; 4]>, specular: &Grid<[f32; 4]>) ->
 }
 
 /// The normal of a surface that has no other.
-fn only_normal(surface: &dyn Surface) -> Option<Vec3> {
+pub(super) fn only_normal(surface: &dyn Surface) -> Option<Vec3> {
     let size = surface.size();
     let mut row = SurfaceRow::flat(size.width);
     surface.read_row(0, &mut row);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::Vec2;
+use glam::DVec2;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::surface::{Surface, SurfaceRow, Wraps};
 
@@ -21,9 +21,9 @@ impl Mirrors {
     }
 
     /// Scale from the texture's coordinates to those of the texture and its images together.
-    pub(super) fn scale(self) -> Vec2 {
+    pub(super) fn scale(self) -> DVec2 {
         let half = |mirrored: bool| if mirrored { 0.5 } else { 1.0 };
-        Vec2::new(half(self.x), half(self.y))
+        DVec2::new(half(self.x), half(self.y))
     }
 
     /// A texture's values with their images beside them.

@@ -9,11 +9,15 @@ mod corners;
 #[cfg(feature = "gltf")]
 mod gltf;
 #[cfg(any(feature = "gltf", feature = "obj"))]
+mod laying;
+#[cfg(any(feature = "gltf", feature = "obj"))]
 mod material;
 #[cfg(feature = "gltf")]
 mod mirror;
 #[cfg(feature = "ply")]
 mod ply;
+#[cfg(any(feature = "gltf", feature = "obj"))]
+mod relay;
 #[cfg(feature = "obj")]
 mod ufbx;
 mod unwrap;

@@ -6,19 +6,18 @@
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-use glam::{DMat3, DVec3, Vec2};
+use glam::{DAffine2, DMat2, DMat3, DVec2, DVec3, Vec2};
 use ndfmap_core::grid::Grid;
 use ndfmap_core::lookup::area_mean;
-use ndfmap_core::surface::{Surface, Wrap, Wraps};
+use ndfmap_core::surface::{Wrap, Wraps};
 use ndfmap_scene::Material;
 use ufbx::{
-    AllocatorOpts, CoordinateAxes, FileFormat, IndexErrorHandling, LoadOpts, MaterialMap, Matrix, Texture,
-    WrapMode,
+    AllocatorOpts, CoordinateAxes, FileFormat, IndexErrorHandling, LoadOpts, MaterialMap, Matrix, WrapMode,
 };
 
 use super::corners::CornerMesh;
+use super::laying::{Laying, NormalTexture, Texture, Textures, ValueTexture};
 use super::material::{Factors, MetalRough, colours};
 use super::{MAX_ELEMENTS, ModelFormat, Parts};
 use crate::attribute::Transfer;
@@ -80,11 +79,15 @@ fn read(
         MapError::invalid(path, format!("is damaged: {}{more}", e.description.to_lowercase()))
     })?;
     let mut parts = Parts::default();
+    let mut layings = Vec::new();
     for material in &scene.materials {
-        parts.materials.push(Look { path, material }.read(warnings)?);
+        let (material, laying) = Look { path, material }.read(warnings)?;
+        parts.materials.push(material);
+        layings.push(laying);
     }
     let plain = parts.materials.len();
     parts.materials.push(super::plain());
+    layings.push(Laying::PLAIN);
     let (mut triangles, mut left_out, mut unmapped) = (0, 0, false);
     for node in &scene.nodes {
         let Some(mesh) = &node.mesh else { continue };
@@ -99,9 +102,10 @@ fn read(
             let own = node.materials.get(at).or_else(|| mesh.materials.get(at));
             let material = own.map_or(plain, |m| m.element.typed_id as usize);
             let gone = || MapError::invalid(path, "has a face of a vertex that is not there");
-            let corners = shape.part(part).ok_or_else(gone)?;
+            let mut corners = shape.part(part).ok_or_else(gone)?;
             unmapped |=
                 mesh.vertex_uv.exists && corners.uvs.as_chunks::<3>().0.contains(&[NO_COORDINATES; 3]);
+            corners.uvs.iter_mut().for_each(|uv| *uv = layings[material].apply(*uv));
             parts.meshes.push((corners.weld(), material));
         }
     }
@@ -231,13 +235,14 @@ struct Look<'a> {
 }
 
 impl Look<'_> {
-    /// Material in metalness and roughness, as the library makes it; a plain one where the file says nothing.
-    fn read(&self, warnings: &mut Vec<String>) -> Result<Material, MapError> {
+    /// Material in metalness and roughness, as the library makes it, and the laying of its map; a plain one
+    /// where the file says nothing.
+    fn read(&self, warnings: &mut Vec<String>) -> Result<(Material, Laying), MapError> {
         let (pbr, fbx) = (&self.material.pbr, &self.material.fbx);
         let name = self.material.element.name.to_string();
         let named = [&pbr.base_color, &pbr.roughness, &pbr.metalness, &pbr.normal_map, &fbx.bump];
         if !pbr.base_color.has_value && named.iter().all(|map| texture(map).is_none()) {
-            return Ok(Material { name, ..super::plain() });
+            return Ok((Material { name, ..super::plain() }, Laying::PLAIN));
         }
         let number = |map: &MaterialMap, or: f64| if map.has_value { map.value_vec4.x } else { or };
         let colour = pbr.base_color.value_vec4;
@@ -249,38 +254,35 @@ impl Look<'_> {
         };
         let metal_rough = self.metal_rough(glossy, warnings)?;
         let base = self.values(&pbr.base_color, Transfer::Srgb, warnings)?;
+        let [base_textured, metal_rough_textured] = [base.is_some(), metal_rough.is_some()];
         // A texture stands in the place of the number (the library's documentation of `MaterialMap`).
         let unless = |textured: bool, value: f64| if textured { 1.0 } else { value as f32 };
-        let rough_textured = texture(&pbr.roughness).is_some() && metal_rough.is_some();
-        let metal_textured = texture(&pbr.metalness).is_some() && metal_rough.is_some();
+        let rough_textured = texture(&pbr.roughness).is_some() && metal_rough_textured;
+        let metal_textured = texture(&pbr.metalness).is_some() && metal_rough_textured;
+        let textures = Textures { normals: self.normals(warnings)?, base, metal_rough }.arranged();
+        let laying = textures.laying;
         let made = MetalRough {
             name,
             factors: Factors {
-                base: [colour.x, colour.y, colour.z].map(|c| unless(base.is_some(), c * factor)),
+                base: [colour.x, colour.y, colour.z].map(|c| unless(base_textured, c * factor)),
                 metallic: unless(metal_textured, number(&pbr.metalness, 0.0)),
                 roughness: unless(rough_textured, roughness),
             },
-            normals: self.normals(warnings)?,
-            base,
-            metal_rough,
-            wraps: texture(&pbr.base_color).map(wraps).unwrap_or_default(),
+            textures,
         };
-        Ok(made.into_material(warnings))
+        Ok((made.into_material(warnings), laying))
     }
 
     /// Picture of a texture, and a path to name it by; `None` with a warning where it is not there.
     fn image(
         &self,
-        texture: &Texture,
+        texture: &ufbx::Texture,
         warnings: &mut Vec<String>,
     ) -> Result<Option<(PathBuf, Image)>, MapError> {
         let name = match texture.relative_filename.is_empty() {
             true => texture.filename.to_string(),
             false => texture.relative_filename.to_string(),
         };
-        if texture.has_uv_transform {
-            warnings.push(format!("has a transform of the texture `{name}`, which is not read"));
-        }
         if !texture.content.is_empty() {
             let path = self.path.join(Path::new(&name).file_name().unwrap_or_default());
             return read_image(&path, &texture.content).map(|image| Some((path, image)));
@@ -298,10 +300,36 @@ impl Look<'_> {
         map: &MaterialMap,
         transfer: Transfer,
         warnings: &mut Vec<String>,
-    ) -> Result<Option<Grid<[f32; 4]>>, MapError> {
+    ) -> Result<Option<ValueTexture>, MapError> {
         let Some(texture) = texture(map) else { return Ok(None) };
         let Some((file, image)) = self.image(texture, warnings)? else { return Ok(None) };
-        colours(&file, &image, transfer).map(Some)
+        let content = colours(&file, &image, transfer)?;
+        Ok(Some(Texture { content, laying: self.laying(texture) }))
+    }
+
+    /// Laying of a texture of this material.
+    fn laying(&self, texture: &ufbx::Texture) -> Laying {
+        let m = &texture.uv_to_texture;
+        let fbx = DAffine2::from_mat2_translation(
+            DMat2::from_cols(DVec2::new(m.m00, m.m10), DVec2::new(m.m01, m.m11)),
+            DVec2::new(m.m03, m.m13),
+        );
+        // v points up the picture in both formats, ours down.
+        let turned = DAffine2::from_scale_angle_translation(DVec2::new(1.0, -1.0), 0.0, DVec2::Y);
+        let upright = match texture.has_uv_transform {
+            true => fbx,
+            false => placement(texture),
+        };
+        let clamped = option(texture, "clamp").is_some_and(|text| text == "on");
+        let wrap = |mode| if clamped || mode == WrapMode::Clamp { Wrap::Clamp } else { Wrap::Repeat };
+        // Only meshes know the number of a set; textures of one material can be told apart without.
+        let name = |texture: &ufbx::Texture| texture.uv_set.to_string();
+        let set = self.material.textures.iter().position(|used| name(&used.texture) == name(texture));
+        Laying {
+            set: set.unwrap_or_default() as u32,
+            transform: turned * upright * turned,
+            wraps: Wraps { x: wrap(texture.wrap_u), y: wrap(texture.wrap_v) },
+        }
     }
 
     /// Roughness and metalness in the channels of glTF, at the larger of their two sizes.
@@ -309,23 +337,32 @@ impl Look<'_> {
         &self,
         glossy: bool,
         warnings: &mut Vec<String>,
-    ) -> Result<Option<Grid<[f32; 4]>>, MapError> {
+    ) -> Result<Option<ValueTexture>, MapError> {
         let pbr = &self.material.pbr;
         let rough = self.values(&pbr.roughness, Transfer::Linear, warnings)?;
         let metal = self.values(&pbr.metalness, Transfer::Linear, warnings)?;
-        let sizes = [&rough, &metal].into_iter().flatten().map(Grid::size);
+        let maps = || [&rough, &metal].into_iter().flatten();
+        let sizes = maps().map(|map| map.content.size());
         let Some(size) = sizes.max_by_key(|size| size.area()) else { return Ok(None) };
-        let first = |map: &Option<Grid<[f32; 4]>>, x: usize, y: usize| {
-            map.as_ref().map(|map| area_mean(map, size, x, y)[0])
+        let layings: Vec<Laying> = maps().map(|map| map.laying).collect();
+        if layings.iter().any(|laying| *laying != layings[0]) {
+            warnings.push(format!(
+                "metalness of `{}` lies otherwise than its roughness, and is laid on as that",
+                &*self.material.element.name
+            ));
+        }
+        let first = |map: &Option<ValueTexture>, x: usize, y: usize| {
+            map.as_ref().map(|map| area_mean(&map.content, size, x, y)[0])
         };
-        Ok(Some(Grid::from_fn(size, |x, y| {
+        let content = Grid::from_fn(size, |x, y| {
             let rough = first(&rough, x, y).map_or(1.0, |r| if glossy { 1.0 - r } else { r });
             [1.0, rough, first(&metal, x, y).unwrap_or(1.0), 1.0]
-        })))
+        });
+        Ok(Some(Texture { content, laying: layings[0] }))
     }
 
     /// Normals of the normal map, or of a bump map that holds normals, as exporters of OBJ write them.
-    fn normals(&self, warnings: &mut Vec<String>) -> Result<Option<Arc<dyn Surface>>, MapError> {
+    fn normals(&self, warnings: &mut Vec<String>) -> Result<Option<NormalTexture>, MapError> {
         let (pbr, fbx) = (&self.material.pbr, &self.material.fbx);
         let normal = [&pbr.normal_map, &fbx.normal_map].into_iter().find_map(texture);
         let Some(texture) = normal.or_else(|| texture(&fbx.bump)) else { return Ok(None) };
@@ -338,12 +375,10 @@ impl Look<'_> {
             ));
             return Ok(None);
         }
+        let laying = self.laying(texture);
         // Neither format says where green points.
-        let options = SourceOptions {
-            kind: Some(SourceKind::Normal),
-            wraps: wraps(texture),
-            ..SourceOptions::default()
-        };
+        let options =
+            SourceOptions { kind: Some(SourceKind::Normal), wraps: laying.wraps, ..SourceOptions::default() };
         let map = source_of_image(&file, image.clone(), String::new(), &options).or_else(|_| {
             warnings.push(format!(
                 "normal map of `{name}` does not tell whether green points up, and is taken so"
@@ -352,16 +387,29 @@ impl Look<'_> {
             source_of_image(&file, image, String::new(), &options)
         })?;
         warnings.extend(map.warnings.iter().map(|w| format!("normal map of `{name}` {w}")));
-        Ok(Some(map.surface))
+        Ok(Some(Texture { content: map.surface, laying }))
     }
 }
 
-/// Texture of a slot that is in use.
-fn texture(map: &MaterialMap) -> Option<&Texture> {
-    map.texture.as_deref().filter(|_| map.texture_enabled)
+/// Text of an option before the name of a texture in a material library, `-NAME TEXT`.
+fn option(texture: &ufbx::Texture, name: &str) -> Option<String> {
+    texture.element.props.find_prop(name).map(|prop| prop.value_str.to_string())
 }
 
-fn wraps(texture: &Texture) -> Wraps {
-    let wrap = |mode| if mode == WrapMode::Clamp { Wrap::Clamp } else { Wrap::Repeat };
-    Wraps { x: wrap(texture.wrap_u), y: wrap(texture.wrap_v) }
+/// Transform by the options of a material library, v up: `-s` scales coordinates, then `-o` moves them, as
+/// exporters write them and engines read them (the format's text leaves open whether `-s 2` shows a texture
+/// twice or half).
+fn placement(texture: &ufbx::Texture) -> DAffine2 {
+    let pair = |name: &str, or: f64| {
+        let text = option(texture, name).unwrap_or_default();
+        let numbers: Vec<f64> = text.split_whitespace().map_while(|word| word.parse().ok()).collect();
+        let part = |i: usize| numbers.get(i).copied().filter(|v| v.is_finite()).unwrap_or(or);
+        DVec2::new(part(0), part(1))
+    };
+    DAffine2::from_scale_angle_translation(pair("s", 1.0), 0.0, pair("o", 0.0))
+}
+
+/// Texture of a slot that is in use.
+fn texture(map: &MaterialMap) -> Option<&ufbx::Texture> {
+    map.texture.as_deref().filter(|_| map.texture_enabled)
 }

@@ -1,11 +1,11 @@
 //! glTF 2.0 by the `gltf` crate: meshes in the pose of the file, and metallic-roughness materials.
 //!
 //! It reads positions, normals, tangents and coordinates in every type (`KHR_mesh_quantization`), compressed
-//! too (`EXT_meshopt_compression`, `KHR_meshopt_compression`), the normal texture with
-//! `KHR_texture_transform` and scale, base colour, metalness and roughness, factors and textures, and one
-//! colour for all vertices of a primitive. Colours and roughness are averaged over the texels of the normal
-//! map; without one, the colours' own coordinates and transform count. It does not read animation, skins,
-//! morphs, colours that vary from vertex to vertex, occlusion, emission, alpha, cameras and lights.
+//! too (`EXT_meshopt_compression`, `KHR_meshopt_compression`), the normal texture with its scale, base colour,
+//! metalness and roughness, factors and textures, each with its `KHR_texture_transform`, and one colour for
+//! all vertices of a primitive. Colours and roughness are averaged over the texels of the normal map. It
+//! does not read animation, skins, morphs, colours that vary from vertex to vertex, occlusion, emission,
+//! alpha, cameras and lights.
 
 mod accessors;
 mod document;
@@ -16,10 +16,9 @@ use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use glam::{Mat3, Mat4, Vec3, Vec4};
-use ndfmap_core::surface::Wraps;
 
 use self::document::Opened;
-use self::textures::Laying;
+use super::laying::{Laying, Textures};
 use super::material::{Factors, MetalRough};
 use super::{MAX_ELEMENTS, ModelFormat, Parts, RawMesh};
 use crate::MapError;
@@ -62,11 +61,18 @@ fn read(path: &Path, bytes: &[u8], warnings: &mut Vec<String>) -> Result<Parts, 
 /// primitive's vertices.
 type MaterialKey = (Option<usize>, [u32; 3]);
 
+/// Material that was made: its index, and the laying of its map.
+#[derive(Clone, Copy)]
+struct Known {
+    index: usize,
+    laying: Laying,
+}
+
 /// Walk over the nodes that collects their meshes, and the materials that those use.
 struct Walk<'a> {
     opened: &'a Opened<'a>,
     parts: Parts,
-    materials: HashMap<MaterialKey, usize>,
+    materials: HashMap<MaterialKey, Known>,
     /// Nodes visited: a tree has each once.
     seen: HashSet<usize>,
     /// Vertices and indices so far.
@@ -91,9 +97,10 @@ impl Walk<'_> {
         for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
             use gltf::mesh::Mode;
             if matches!(primitive.mode(), Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
-                let mesh = self.primitive(&primitive, pose)?;
+                self.count(&primitive)?;
                 let material = self.material(&primitive)?;
-                self.parts.meshes.push((mesh, material));
+                let mesh = self.primitive(&primitive, material.laying, pose)?;
+                self.parts.meshes.push((mesh, material.index));
             } else {
                 self.left_out += 1;
             }
@@ -104,8 +111,8 @@ impl Walk<'_> {
         Ok(())
     }
 
-    /// Index of a primitive's material, which is made where it is not known yet.
-    fn material(&mut self, primitive: &gltf::Primitive<'_>) -> Result<usize, MapError> {
+    /// A primitive's material, which is made where it is not known yet.
+    fn material(&mut self, primitive: &gltf::Primitive<'_>) -> Result<Known, MapError> {
         let tint = self.tint(primitive)?;
         let material = primitive.material();
         let key = (material.index(), tint.to_array().map(f32::to_bits));
@@ -113,14 +120,15 @@ impl Walk<'_> {
             return Ok(*known);
         }
         // The default material is ours, not glTF's metal, but for the colour of its vertices.
-        let made = match material.index() {
+        let (made, laying) = match material.index() {
             Some(_) => self.opened.material(&material, tint, self.warnings)?,
-            None if tint == Vec3::ONE => super::plain(),
-            None => tinted(tint).into_material(self.warnings),
+            None if tint == Vec3::ONE => (super::plain(), Laying::PLAIN),
+            None => (tinted(tint).into_material(self.warnings), Laying::PLAIN),
         };
         self.parts.materials.push(made);
-        self.materials.insert(key, self.parts.materials.len() - 1);
-        Ok(self.parts.materials.len() - 1)
+        let known = Known { index: self.parts.materials.len() - 1, laying };
+        self.materials.insert(key, known);
+        Ok(known)
     }
 
     /// The colour of all vertices, which multiplies the base colour (glTF 2.0, 3.9.2); white where they
@@ -141,7 +149,8 @@ impl Walk<'_> {
         Ok(Vec3::ONE)
     }
 
-    fn primitive(&mut self, primitive: &gltf::Primitive<'_>, pose: Mat4) -> Result<RawMesh, MapError> {
+    /// Counts a primitive's vertices and indices.
+    fn count(&mut self, primitive: &gltf::Primitive<'_>) -> Result<(), MapError> {
         let path = self.opened.path;
         let counts =
             primitive.attributes().map(|(_, a)| a.count()).chain(primitive.indices().map(|a| a.count()));
@@ -157,6 +166,17 @@ impl Walk<'_> {
                 format!("has more than {MAX_ELEMENTS} vertices or triangles"),
             ));
         }
+        Ok(())
+    }
+
+    /// Mesh of a primitive, with the coordinates of its material's map.
+    fn primitive(
+        &self,
+        primitive: &gltf::Primitive<'_>,
+        laying: Laying,
+        pose: Mat4,
+    ) -> Result<RawMesh, MapError> {
+        let path = self.opened.path;
         let rotation = Mat3::from_mat4(pose);
         let normal_matrix = rotation.inverse().transpose();
         let mirrored = rotation.determinant() < 0.0;
@@ -173,7 +193,6 @@ impl Walk<'_> {
         if mirrored {
             triangles.iter_mut().for_each(|t| t.swap(1, 2));
         }
-        let laying = Laying::of(&primitive.material());
         let uvs = match get(gltf::Semantic::TexCoords(laying.set)) {
             Some(uvs) => self.opened.vectors::<2>(&uvs)?,
             None => Vec::new(),
@@ -210,10 +229,7 @@ fn tinted(tint: Vec3) -> MetalRough {
     MetalRough {
         name: "plain".to_owned(),
         factors: Factors { base: tint.to_array(), metallic: 0.0, roughness: 0.5 },
-        normals: None,
-        base: None,
-        metal_rough: None,
-        wraps: Wraps::default(),
+        textures: Textures::default().arranged(),
     }
 }
 

@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::{Vec2, Vec3};
+use glam::{DAffine2, DMat2, DVec2, Vec3};
 use gltf::texture::WrappingMode;
-use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::grid::Size;
 use ndfmap_core::surface::{Surface, SurfaceRow, Wrap, Wraps, unit_or_up};
 use ndfmap_scene::Material;
 
+use super::super::laying::{Laying, NormalTexture, Texture, Textures, ValueTexture};
 use super::super::material::{Factors, MetalRough, colours};
 use super::super::mirror::Mirrors;
 use super::document::{Opened, resource};
@@ -63,27 +64,27 @@ impl Opened<'_> {
         Ok((file, image))
     }
 
-    /// A texture's values, decoded, with their images where they are mirrored.
+    /// A texture's values, decoded, with their images where they are mirrored, and its laying.
     fn values(
         &self,
         info: Option<&gltf::texture::Info<'_>>,
         transfer: Transfer,
-    ) -> Result<Option<Grid<[f32; 4]>>, MapError> {
+    ) -> Result<Option<ValueTexture>, MapError> {
         let Some(info) = info else { return Ok(None) };
         let (file, image) = self.image(&info.texture())?;
-        let values = colours(&file, &image, transfer)?;
-        Ok(Some(Laying::of_info(info).mirrors.values(values)))
+        let content = mirrors(&info.texture()).values(colours(&file, &image, transfer)?);
+        Ok(Some(Texture { content, laying: laying_of_info(info) }))
     }
 
-    /// Normals of a material's normal texture.
+    /// Normals of a material's normal texture, and its laying.
     fn normals(
         &self,
         material: &gltf::Material<'_>,
         warnings: &mut Vec<String>,
-    ) -> Result<Option<Arc<dyn Surface>>, MapError> {
+    ) -> Result<Option<NormalTexture>, MapError> {
         let Some(normal) = material.normal_texture() else { return Ok(None) };
         let (file, image) = self.image(&normal.texture())?;
-        let laying = Laying::of_normal(&normal);
+        let laying = laying_of_normal(&normal);
         let options = SourceOptions {
             kind: Some(SourceKind::Normal),
             // Green is up in glTF (2.0, 3.9.3).
@@ -94,14 +95,15 @@ impl Opened<'_> {
         let map = source_of_image(&file, image, String::new(), &options)?;
         let name = material.name().unwrap_or("unnamed");
         warnings.extend(map.warnings.iter().map(|w| format!("normal map of `{name}` {w}")));
-        let surface = laying.mirrors.surface(map.surface);
-        Ok(Some(match normal.scale() {
+        let surface = mirrors(&normal.texture()).surface(map.surface);
+        let surface: Arc<dyn Surface> = match normal.scale() {
             1.0 => surface,
             scale => Arc::new(Scaled { inner: surface, scale }),
-        }))
+        };
+        Ok(Some(Texture { content: surface, laying }))
     }
 
-    /// A material whose base colour is multiplied by `tint`, linear.
+    /// A material whose base colour is multiplied by `tint`, linear, and the laying of its map.
     ///
     /// # Errors
     /// [`MapError`] for textures that cannot be read.
@@ -110,124 +112,71 @@ impl Opened<'_> {
         material: &gltf::Material<'_>,
         tint: Vec3,
         warnings: &mut Vec<String>,
-    ) -> Result<Material, MapError> {
-        let name = material.name().unwrap_or("unnamed").to_owned();
+    ) -> Result<(Material, Laying), MapError> {
         let pbr = material.pbr_metallic_roughness();
-        let infos = [pbr.base_color_texture(), pbr.metallic_roughness_texture()];
-        let laying = Laying::of(material);
-        if infos.iter().flatten().any(|info| Laying::of_info(info) != laying) {
-            warnings.push(format!(
-                "textures of `{name}` do not lie alike (coordinates, transform or edges): all are laid on as its \
-                 normal map, or without one as its colours"
-            ));
-        }
         let [r, g, b, _] = pbr.base_color_factor();
+        let textures = Textures {
+            normals: self.normals(material, warnings)?,
+            base: self.values(pbr.base_color_texture().as_ref(), Transfer::Srgb)?,
+            metal_rough: self.values(pbr.metallic_roughness_texture().as_ref(), Transfer::Linear)?,
+        };
+        let textures = textures.arranged();
+        let laying = textures.laying;
         let made = MetalRough {
-            name,
+            name: material.name().unwrap_or("unnamed").to_owned(),
             factors: Factors {
                 base: (Vec3::new(r, g, b) * tint).to_array(),
                 metallic: pbr.metallic_factor(),
                 roughness: pbr.roughness_factor(),
             },
-            normals: self.normals(material, warnings)?,
-            base: self.values(infos[0].as_ref(), Transfer::Srgb)?,
-            metal_rough: self.values(infos[1].as_ref(), Transfer::Linear)?,
-            wraps: laying.wraps,
+            textures,
         };
-        Ok(made.into_material(warnings))
+        Ok((made.into_material(warnings), laying))
     }
 }
 
-/// Transform of a texture's coordinates, `KHR_texture_transform`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct TextureTransform {
-    offset: Vec2,
-    /// Radians, counter-clockwise as seen with v down.
-    rotation: f32,
-    scale: Vec2,
+/// Transform of `KHR_texture_transform`: coordinates are scaled, turned counter-clockwise as seen with v down
+/// (by radians), and moved.
+fn transform(offset: [f32; 2], rotation: f32, scale: [f32; 2]) -> DAffine2 {
+    let [offset, scale] = [offset, scale].map(|[x, y]| DVec2::new(x.into(), y.into()));
+    let (sin, cos) = f64::from(rotation).sin_cos();
+    let turn = DMat2::from_cols(DVec2::new(cos, -sin), DVec2::new(sin, cos));
+    DAffine2::from_mat2_translation(turn * DMat2::from_diagonal(scale), offset)
 }
 
-impl TextureTransform {
-    const IDENTITY: Self = Self { offset: Vec2::ZERO, rotation: 0.0, scale: Vec2::ONE };
-
-    /// Coordinates scaled, then rotated, then moved.
-    fn apply(&self, uv: Vec2) -> Vec2 {
-        let (sin, cos) = self.rotation.sin_cos();
-        let uv = uv * self.scale;
-        Vec2::new(cos * uv.x + sin * uv.y, cos * uv.y - sin * uv.x) + self.offset
-    }
+fn mirrors(texture: &gltf::Texture<'_>) -> Mirrors {
+    let mirrored = |mode| mode == WrappingMode::MirroredRepeat;
+    let sampler = texture.sampler();
+    Mirrors { x: mirrored(sampler.wrap_s()), y: mirrored(sampler.wrap_t()) }
 }
 
-/// Laying of a texture on a mesh: its set of coordinates, their transform, and its continuation beyond the
-/// edges.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Laying {
-    pub(super) set: u32,
-    transform: TextureTransform,
-    wraps: Wraps,
-    mirrors: Mirrors,
+/// Laying of a texture, its images included where it is mirrored.
+fn laying(set: u32, transform: DAffine2, texture: &gltf::Texture<'_>) -> Laying {
+    let wrap = |mode| if mode == WrappingMode::ClampToEdge { Wrap::Clamp } else { Wrap::Repeat };
+    let (sampler, doubled) = (texture.sampler(), DAffine2::from_scale(mirrors(texture).scale()));
+    let wraps = Wraps { x: wrap(sampler.wrap_s()), y: wrap(sampler.wrap_t()) };
+    Laying { set, transform: doubled * transform, wraps }
 }
 
-impl Laying {
-    /// Laying of a material's map: of its normals, else of its colours, else of its roughness.
-    pub(super) fn of(material: &gltf::Material<'_>) -> Self {
-        let pbr = material.pbr_metallic_roughness();
-        let others = || pbr.base_color_texture().or_else(|| pbr.metallic_roughness_texture());
-        let plain = Self {
-            set: 0,
-            transform: TextureTransform::IDENTITY,
-            wraps: Wraps::default(),
-            mirrors: Mirrors::default(),
-        };
-        let normal = material.normal_texture().map(|normal| Self::of_normal(&normal));
-        normal.or_else(|| others().map(|info| Self::of_info(&info))).unwrap_or(plain)
-    }
+fn laying_of_info(info: &gltf::texture::Info<'_>) -> Laying {
+    let own = info.texture_transform();
+    let set = own.as_ref().and_then(|own| own.tex_coord()).unwrap_or(info.tex_coord());
+    let transform =
+        own.map_or(DAffine2::IDENTITY, |own| transform(own.offset(), own.rotation(), own.scale()));
+    laying(set, transform, &info.texture())
+}
 
-    /// Coordinates of the mesh as coordinates of the map, its images included where it is mirrored.
-    pub(super) fn apply(&self, uv: Vec2) -> Vec2 {
-        self.transform.apply(uv) * self.mirrors.scale()
-    }
-
-    fn new(set: u32, transform: TextureTransform, sampler: &gltf::texture::Sampler<'_>) -> Self {
-        let (x, y) = (sampler.wrap_s(), sampler.wrap_t());
-        let wrap = |mode| if mode == WrappingMode::ClampToEdge { Wrap::Clamp } else { Wrap::Repeat };
-        let mirrored = |mode| mode == WrappingMode::MirroredRepeat;
-        Self {
-            set,
-            transform,
-            wraps: Wraps { x: wrap(x), y: wrap(y) },
-            mirrors: Mirrors { x: mirrored(x), y: mirrored(y) },
-        }
-    }
-
-    fn of_info(info: &gltf::texture::Info<'_>) -> Self {
-        let own = info.texture_transform();
-        let set = own.as_ref().and_then(|own| own.tex_coord()).unwrap_or(info.tex_coord());
-        let transform = own.map_or(TextureTransform::IDENTITY, |own| TextureTransform {
-            offset: own.offset().into(),
-            rotation: own.rotation(),
-            scale: own.scale().into(),
-        });
-        Self::new(set, transform, &info.texture().sampler())
-    }
-
-    /// Laying of a normal texture, whose extension the crate keeps as plain JSON.
-    fn of_normal(normal: &gltf::material::NormalTexture<'_>) -> Self {
-        let sampler = normal.texture().sampler();
-        let Some(value) = normal.extension_value("KHR_texture_transform") else {
-            return Self::new(normal.tex_coord(), TextureTransform::IDENTITY, &sampler);
-        };
-        let number = |value: Option<&serde_json::Value>, or: f32| {
-            value.and_then(serde_json::Value::as_f64).map_or(or, |v| v as f32)
-        };
-        let pair = |key: &str, or: f32| {
-            let part = |i: usize| number(value.get(key).and_then(|v| v.get(i)), or);
-            Vec2::new(part(0), part(1))
-        };
-        let own = value.get("texCoord").and_then(serde_json::Value::as_u64);
-        let set = own.and_then(|own| u32::try_from(own).ok()).unwrap_or(normal.tex_coord());
-        let (offset, rotation, scale) =
-            (pair("offset", 0.0), number(value.get("rotation"), 0.0), pair("scale", 1.0));
-        Self::new(set, TextureTransform { offset, rotation, scale }, &sampler)
-    }
+/// Laying of a normal texture, whose extension the crate keeps as plain JSON.
+fn laying_of_normal(normal: &gltf::material::NormalTexture<'_>) -> Laying {
+    let Some(value) = normal.extension_value("KHR_texture_transform") else {
+        return laying(normal.tex_coord(), DAffine2::IDENTITY, &normal.texture());
+    };
+    let number = |value: Option<&serde_json::Value>, or: f32| {
+        value.and_then(serde_json::Value::as_f64).map_or(or, |v| v as f32)
+    };
+    let pair = |key: &str, or: f32| [0, 1].map(|i: usize| number(value.get(key).and_then(|v| v.get(i)), or));
+    let own = value.get("texCoord").and_then(serde_json::Value::as_u64);
+    let set = own.and_then(|own| u32::try_from(own).ok()).unwrap_or(normal.tex_coord());
+    let transform = transform(pair("offset", 0.0), number(value.get("rotation"), 0.0), pair("scale", 1.0));
+    laying(set, transform, &normal.texture())
 }
