@@ -1,7 +1,8 @@
 //! Error of a few methods over a folder of normal maps, at texels and between them: the table of
 //! `docs/choose.md`.
 //!
-//! `cargo run --release -p ndfmap-figures --bin choice_of_method -- FOLDER [LOBE]`
+//! `cargo run --release -p ndfmap-figures --bin choice_of_method -- FOLDER [LOBE [METHOD,METHOD]]`; the
+//! first method is the one that others are divided by.
 
 use std::path::{Path, PathBuf};
 
@@ -13,8 +14,8 @@ use ndfmap::core::pyramid::Precision;
 use ndfmap::maps::formats::{is_picture, read_file, read_image};
 use ndfmap::maps::source::{Convention, PictureKind, SourceOptions, identify, source_of_image};
 
-/// Methods, the one that others are divided by first.
-const METHODS: [&str; 7] = ["toksvig", "naive", "slopes", "vmf:1", "vmf:2", "vmf:3", "vmf:4"];
+/// Methods unless told otherwise.
+const METHODS: &str = "toksvig,naive,slopes,vmf:1,vmf:2,vmf:3,vmf:4";
 
 /// Levels over which errors are averaged: those of distances at which maps are seen.
 const LEVELS: std::ops::RangeInclusive<usize> = 2..=7;
@@ -81,7 +82,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let folder = arguments.next().ok_or("name a folder of normal maps")?;
     let lobe = arguments.next().unwrap_or_else(|| LOBE.to_owned()).parse::<AnyLobe>()?;
-    let methods = METHODS.map(str::parse::<AnyMethod>).into_iter().collect::<Result<Vec<_>, _>>()?;
+    let methods = arguments.next().unwrap_or_else(|| METHODS.to_owned());
+    let methods = methods.split(',').map(str::parse::<AnyMethod>).collect::<Result<Vec<_>, _>>()?;
     let mut files: Vec<PathBuf> =
         std::fs::read_dir(folder)?.filter_map(|entry| Some(entry.ok()?.path())).collect();
     files.retain(|file| is_picture(file));
@@ -95,9 +97,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     println!("{} maps, {lobe}, levels {} to {}", all.len(), LEVELS.start(), LEVELS.end());
     println!(
-        "method    bytes   texels  between   of toksvig's: texels  between  worst  better on  level 0  bake s"
+        "method        bytes   texels  between   of the first's: texels  between  worst  better on  level 0  bake s"
     );
-    for (at, method) in METHODS.iter().enumerate() {
+    for (at, method) in methods.iter().enumerate() {
         let measures: Vec<Measures> = all.iter().map(|c| Measures::of(&c.rows[at])).collect();
         let base: Vec<Measures> = all.iter().map(|c| Measures::of(&c.rows[0])).collect();
         let ratios = |of: fn(&Measures) -> f64| -> Vec<f64> {
@@ -105,7 +107,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         };
         let between = ratios(|m| m.between);
         println!(
-            "{method:9} {:>5}  {:>7.3}  {:>7.3}  {:>21.3}  {:>7.3}  {:>5.2}  {:>3} of {}  {:>8.4}  {:>6.2}",
+            "{:13} {:>5}  {:>7.4}  {:>7.4}  {:>23.3}  {:>7.3}  {:>5.2}  {:>3} of {}  {:>8.4}  {:>6.2}",
+            method.to_string(),
             all.first().map_or(0, |c| c.rows[at].bytes_per_texel),
             median(measures.iter().map(|m| m.at).collect()),
             median(measures.iter().map(|m| m.between).collect()),

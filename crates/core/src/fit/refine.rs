@@ -17,6 +17,10 @@
 //! Descent is by `(ln alpha, mu, v)` with momentum, each step divided by a bound on the curvature: that of
 //! the lobe alone, times how crowded its place is. This objective is ours, not the papers' (`docs/methods.md`
 //! has what it gains).
+//!
+//! Diffuse light asks for little but the mean normal, which EM keeps: a texel's sums together are the means of
+//! its normals' statistics. So they are *kept*: each step is brought back to them, by the least increase of `E`.
+//! Without that the lobes of a foil are ten times worse under Lambert, and highlights gain nothing by it.
 
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
@@ -42,6 +46,9 @@ const MOMENTUM: f32 = 0.5;
 /// No step moves a lobe by more than this part of its own width.
 const LONGEST: f32 = 0.3;
 
+/// Newton's steps that bring the last lobes back to the sums that are kept.
+const LAST_STEPS: usize = 3;
+
 /// A lobe and its last step, by `(ln alpha, mu, v)`.
 #[derive(Clone, Copy)]
 struct Moving {
@@ -59,6 +66,7 @@ pub(crate) fn refine(
     let (lobes, width) = (level.lobes, level.size.width);
     let moving = |sums: &[f32; 4]| Moving { shape: family.decode(sums), step: [0.0; 5] };
     let mut all: Vec<Moving> = level.sums.par_iter().map(moving).collect();
+    let kept: Vec<[f32; 4]> = level.sums.chunks(lobes).map(total).collect();
     for round in 0..rounds {
         // The last turns settle.
         let stride = if 3 * round >= 2 * rounds { 0.5 * STEP } else { STEP };
@@ -71,12 +79,14 @@ pub(crate) fn refine(
             rows.iter().map(|rows| (rows, take(rows))).collect();
         tasks.into_par_iter().for_each_init(Samples::<4>::default, |samples, (rows, mut lines)| {
             for columns in &columns {
-                let window = Window { family, grid, size: level.size, lobes, stride, columns, rows };
+                let window =
+                    Window { family, grid, size: level.size, lobes, stride, columns, rows, kept: &kept };
                 window.step(&mut lines, samples);
             }
         });
     }
-    level.sums.par_iter_mut().zip(&all).for_each(|(sums, moving)| *sums = family.settle(&moving.shape));
+    let settled = level.sums.par_chunks_mut(lobes).zip(all.par_chunks_mut(lobes)).zip(&kept);
+    settled.for_each(|((sums, moving), kept)| settle(family, moving, kept, sums));
 }
 
 /// The sums of a level while they are being made: `lobes` after `lobes`, texel after texel.
@@ -108,6 +118,8 @@ struct Window<'a, F> {
     stride: f32,
     columns: &'a [usize],
     rows: &'a [usize],
+    /// Sums of all lobes together, of every texel of the level.
+    kept: &'a [[f32; 4]],
 }
 
 impl<F: Isotropic> Window<'_, F> {
@@ -149,9 +161,101 @@ impl<F: Isotropic> Window<'_, F> {
             for (own, shared) in slopes.iter_mut().zip(&shared) {
                 (0..4).for_each(|k| own[k] = (1.0 - of_window) * own[k] + of_window * shared[k]);
             }
-            move_lobes(family, &mut lines[r][x * lobes..][..lobes], &slopes[..lobes], self.stride);
+            let moving = &mut lines[r][x * lobes..][..lobes];
+            let kept = &self.kept[self.rows[r] * self.size.width + x];
+            move_lobes(family, moving, &slopes[..lobes], self.stride, kept);
         }
     }
+}
+
+/// Sums of a texel's lobes as they are stored; what Newton's steps leave is shared out by weight.
+fn settle(family: impl Isotropic, lobes: &mut [Moving], kept: &[f32; 4], sums: &mut [[f32; 4]]) {
+    let crowded = crowdings(lobes);
+    (0..LAST_STEPS).for_each(|_| keep(family, lobes, &crowded, kept));
+    for (sums, lobe) in sums.iter_mut().zip(lobes.iter()) {
+        *sums = family.settle(&lobe.shape);
+    }
+    let made = total(sums);
+    for sums in sums.iter_mut() {
+        let share = sums[0] / made[0];
+        (0..4).for_each(|k| sums[k] += share * (kept[k] - made[k]));
+    }
+}
+
+/// Sums of all lobes of a texel together: the mean of the statistics of its normals.
+fn total(sums: &[[f32; 4]]) -> [f32; 4] {
+    let mut out = [0.0; 4];
+    for sums in sums {
+        (0..4).for_each(|k| out[k] += sums[k]);
+    }
+    out
+}
+
+/// Compliance of a lobe: the inverse of half the curvature of `E` by each of `(ln alpha, mu, v)`. The curvature
+/// is that of the lobe by itself, `alpha²/(4 pi v)` by `ln alpha`, over `2v` by mu, over `2v²` by v, times how
+/// crowded its place is.
+fn compliance(shape: &Shape, crowded: f32) -> [f32; 5] {
+    let v = shape.variance + LOBE_VARIANCE;
+    let curvature = crowded * shape.alpha * shape.alpha / (2.0 * std::f32::consts::TAU * v);
+    let by_mean = 2.0 * v / curvature;
+    [curvature.recip(), by_mean, by_mean, by_mean, v * by_mean]
+}
+
+/// Moves the lobes of a texel so that their sums together are those that are kept, by the least increase of
+/// `E` in the measure of its curvature: Newton's step for the constraint, `H⁻¹ Jᵀ (J H⁻¹ Jᵀ)⁻¹`.
+fn keep(family: impl Isotropic, lobes: &mut [Moving], crowded: &[f32; MAX_LOBES], kept: &[f32; 4]) {
+    let mut rows = [[[0.0_f32; 5]; 4]; MAX_LOBES];
+    let mut matrix = [[0.0_f64; 4]; 4];
+    let mut off = kept.map(f64::from);
+    for ((lobe, rows), crowded) in lobes.iter().zip(&mut rows).zip(crowded) {
+        if lobe.shape.alpha <= DEAD {
+            continue;
+        }
+        let sums = family.encode(&lobe.shape);
+        let soft = compliance(&lobe.shape, *crowded);
+        for (k, row) in rows.iter_mut().enumerate() {
+            off[k] -= f64::from(sums[k]);
+            let mut unit = [0.0; 4];
+            unit[k] = 1.0;
+            let ShapeSlope { alpha, mean, variance } = family.slope_of_shape(&lobe.shape, &unit);
+            *row = [alpha, mean[0], mean[1], mean[2], variance];
+        }
+        for k in 0..4 {
+            for l in 0..4 {
+                matrix[k][l] += (0..5)
+                    .map(|p| f64::from(rows[k][p]) * f64::from(soft[p]) * f64::from(rows[l][p]))
+                    .sum::<f64>();
+            }
+        }
+    }
+    let pull = glam::DMat4::from_cols_array_2d(&matrix).inverse() * glam::DVec4::from(off);
+    if !pull.is_finite() {
+        return;
+    }
+    let pull = pull.to_array();
+    for ((lobe, rows), crowded) in lobes.iter_mut().zip(&rows).zip(crowded) {
+        if lobe.shape.alpha <= DEAD {
+            continue;
+        }
+        let soft = compliance(&lobe.shape, *crowded);
+        let by: [f32; 5] = std::array::from_fn(|p| {
+            soft[p] * (0..4).map(|k| f64::from(rows[k][p]) * pull[k]).sum::<f64>() as f32
+        });
+        lobe.shape = moved(family, &lobe.shape, &by);
+        (0..5).for_each(|k| lobe.step[k] += by[k]);
+    }
+}
+
+/// Shape after a step by `(ln alpha, mu, v)`, held to a part of its own width.
+fn moved(family: impl Isotropic, shape: &Shape, step: &[f32; 5]) -> Shape {
+    let v = shape.variance + LOBE_VARIANCE;
+    let length = (step[1] * step[1] + step[2] * step[2] + step[3] * step[3]).sqrt();
+    let longest = LONGEST * v.sqrt();
+    let held = if length > longest { longest / length } else { 1.0 };
+    let mean = [0, 1, 2].map(|c| shape.mean[c] + held * step[c + 1]);
+    let variance = shape.variance + step[4].clamp(-LONGEST * v, LONGEST * v);
+    let alpha = shape.alpha * step[0].clamp(-LONGEST, LONGEST).exp();
+    family.shape(alpha, mean, variance)
 }
 
 /// Adds to `seen`, for each lobe, the samples' `Σ w k (1, T)`, k between the lobe and the sample.
@@ -240,35 +344,38 @@ fn crowding(lobes: &[Moving], shape: &Shape) -> f32 {
     lobes.iter().map(near).sum::<f32>() / own
 }
 
-/// Takes one step down `slopes` (by sums) for every lobe of a texel; weights sum to one afterwards.
-fn move_lobes(family: impl Isotropic, lobes: &mut [Moving], slopes: &[[f32; 4]], stride: f32) {
+/// [`crowding`] of all lobes of a texel; 1 for dead ones.
+fn crowdings(lobes: &[Moving]) -> [f32; MAX_LOBES] {
     let mut crowded = [1.0; MAX_LOBES];
     for (crowded, lobe) in crowded.iter_mut().zip(lobes.iter()).filter(|(_, l)| l.shape.alpha > DEAD) {
         *crowded = crowding(lobes, &lobe.shape);
     }
-    let mut total = 0.0;
+    crowded
+}
+
+/// Takes one step down `slopes` (by sums) for every lobe of a texel, whose sums together stay as they are.
+fn move_lobes(
+    family: impl Isotropic,
+    lobes: &mut [Moving],
+    slopes: &[[f32; 4]],
+    stride: f32,
+    kept: &[f32; 4],
+) {
+    let crowded = crowdings(lobes);
     for ((Moving { shape, step }, slope), crowded) in lobes.iter_mut().zip(slopes).zip(crowded) {
         if shape.alpha <= DEAD {
             shape.alpha = 0.0;
             continue;
         }
-        let v = shape.variance + LOBE_VARIANCE;
         let s = family.slope_of_shape(shape, slope);
-        // Half the curvature of E for a lobe by itself: alpha²/(4 pi v) by ln alpha, over 2v by mu, over 2v²
-        // by v.
-        let curvature = crowded * shape.alpha * shape.alpha / (2.0 * std::f32::consts::TAU * v);
-        let by_mean = 2.0 * v / curvature;
-        let [mx, my, mz] = s.mean.map(|m| m * by_mean);
-        let wanted = [s.alpha / curvature, mx, my, mz, s.variance * v * by_mean];
-        (0..5).for_each(|k| step[k] = MOMENTUM * step[k] - stride * wanted[k]);
-        let length = (step[1] * step[1] + step[2] * step[2] + step[3] * step[3]).sqrt();
-        let longest = LONGEST * v.sqrt();
-        let held = if length > longest { longest / length } else { 1.0 };
-        let mean = [0, 1, 2].map(|c| shape.mean[c] + held * step[c + 1]);
-        let variance = shape.variance + step[4].clamp(-LONGEST * v, LONGEST * v);
-        let alpha = shape.alpha * step[0].clamp(-LONGEST, LONGEST).exp();
-        *shape = family.shape(alpha, mean, variance);
-        total += alpha;
+        let [x, y, z] = s.mean;
+        let soft = compliance(shape, crowded);
+        for (k, slope) in [s.alpha, x, y, z, s.variance].into_iter().enumerate() {
+            step[k] = MOMENTUM * step[k] - stride * soft[k] * slope;
+        }
+        *shape = moved(family, shape, step);
     }
+    keep(family, lobes, &crowded, kept);
+    let total: f32 = lobes.iter().map(|lobe| lobe.shape.alpha).sum();
     lobes.iter_mut().for_each(|lobe| lobe.shape.alpha /= total);
 }
