@@ -91,6 +91,9 @@ pub(crate) trait Family<const N: usize>: Copy + Send + Sync {
 
 /// Lobe around a mean with one variance on every axis: four statistics.
 pub(crate) trait Isotropic: Copy + Send + Sync {
+    /// Statistics that tell the mean normal, the weight among them: the first of all.
+    const OF_MEAN: usize;
+
     /// `T(n)`.
     fn sufficient(self, n: Vec3) -> [f32; 3];
 
@@ -224,6 +227,8 @@ pub(crate) fn from_pole(m: &[f32; 3]) -> f32 {
 }
 
 impl Isotropic for Spherical {
+    const OF_MEAN: usize = 4;
+
     #[inline(always)]
     fn sufficient(self, n: Vec3) -> [f32; 3] {
         [n.x, n.y, from_pole(&n.to_array())]
@@ -316,6 +321,9 @@ impl Isotropic for Spherical {
 pub(crate) struct Planar;
 
 impl Isotropic for Planar {
+    // The fourth is the second moment; kept too, it costs more highlight than it gains diffuse light.
+    const OF_MEAN: usize = 3;
+
     #[inline(always)]
     fn sufficient(self, n: Vec3) -> [f32; 3] {
         [n.x, n.y, n.x * n.x + n.y * n.y]

@@ -550,12 +550,19 @@ fn at(size: Size, i: usize) -> (usize, usize) {
     (i % size.width, i / size.width)
 }
 
-/// Removes lobes too light to store; the others take over their weight.
+/// Removes lobes too light to store; the others take over their normals, by weight, so that the mean of all
+/// stays.
 fn remove_light_lobes<const N: usize>(sums: &mut [[f32; N]]) {
     let light = |s: &[f32; N]| s[0] < LEAST_WEIGHT;
     let kept: f32 = sums.iter().filter(|s| !light(s)).map(|s| s[0]).sum();
+    let mut left = [0.0; N];
+    for sums in sums.iter_mut().filter(|s| light(s)) {
+        (0..N).for_each(|k| left[k] += sums[k]);
+        *sums = [0.0; N];
+    }
     for sums in sums.iter_mut() {
-        *sums = if light(sums) { [0.0; N] } else { sums.map(|s| s / kept) };
+        let share = sums[0] / kept;
+        (0..N).for_each(|k| sums[k] += share * left[k]);
     }
 }
 

@@ -19,7 +19,7 @@
 //! has what it gains).
 //!
 //! Diffuse light asks for little but the mean normal, which EM keeps: a texel's sums together are the means of
-//! its normals' statistics. So they are *kept*: each step is brought back to them, by the least increase of `E`.
+//! its normals' statistics. So the mean is *kept*: each step is brought back to it, by the least increase of `E`.
 //! Without that the lobes of a foil are ten times worse under Lambert, and highlights gain nothing by it.
 
 use fearless_simd::{Level, dispatch};
@@ -169,7 +169,7 @@ impl<F: Isotropic> Window<'_, F> {
 }
 
 /// Sums of a texel's lobes as they are stored; what Newton's steps leave is shared out by weight.
-fn settle(family: impl Isotropic, lobes: &mut [Moving], kept: &[f32; 4], sums: &mut [[f32; 4]]) {
+fn settle<F: Isotropic>(family: F, lobes: &mut [Moving], kept: &[f32; 4], sums: &mut [[f32; 4]]) {
     let crowded = crowdings(lobes);
     (0..LAST_STEPS).for_each(|_| keep(family, lobes, &crowded, kept));
     for (sums, lobe) in sums.iter_mut().zip(lobes.iter()) {
@@ -178,7 +178,7 @@ fn settle(family: impl Isotropic, lobes: &mut [Moving], kept: &[f32; 4], sums: &
     let made = total(sums);
     for sums in sums.iter_mut() {
         let share = sums[0] / made[0];
-        (0..4).for_each(|k| sums[k] += share * (kept[k] - made[k]));
+        (0..F::OF_MEAN).for_each(|k| sums[k] += share * (kept[k] - made[k]));
     }
 }
 
@@ -201,9 +201,9 @@ fn compliance(shape: &Shape, crowded: f32) -> [f32; 5] {
     [curvature.recip(), by_mean, by_mean, by_mean, v * by_mean]
 }
 
-/// Moves the lobes of a texel so that their sums together are those that are kept, by the least increase of
-/// `E` in the measure of its curvature: Newton's step for the constraint, `H⁻¹ Jᵀ (J H⁻¹ Jᵀ)⁻¹`.
-fn keep(family: impl Isotropic, lobes: &mut [Moving], crowded: &[f32; MAX_LOBES], kept: &[f32; 4]) {
+/// Moves the lobes of a texel so that their mean normal is the one that is kept, by the least increase of `E` in
+/// the measure of its curvature: Newton's step for the constraint, `H⁻¹ Jᵀ (J H⁻¹ Jᵀ)⁻¹`.
+fn keep<F: Isotropic>(family: F, lobes: &mut [Moving], crowded: &[f32; MAX_LOBES], kept: &[f32; 4]) {
     let mut rows = [[[0.0_f32; 5]; 4]; MAX_LOBES];
     let mut matrix = [[0.0_f64; 4]; 4];
     let mut off = kept.map(f64::from);
@@ -227,6 +227,12 @@ fn keep(family: impl Isotropic, lobes: &mut [Moving], crowded: &[f32; MAX_LOBES]
                     .sum::<f64>();
             }
         }
+    }
+    // Other statistics are free.
+    for k in F::OF_MEAN..4 {
+        matrix[k] = std::array::from_fn(|l| f64::from(u8::from(k == l)));
+        (0..4).for_each(|l| matrix[l][k] = matrix[k][l]);
+        off[k] = 0.0;
     }
     let pull = glam::DMat4::from_cols_array_2d(&matrix).inverse() * glam::DVec4::from(off);
     if !pull.is_finite() {
@@ -353,7 +359,7 @@ fn crowdings(lobes: &[Moving]) -> [f32; MAX_LOBES] {
     crowded
 }
 
-/// Takes one step down `slopes` (by sums) for every lobe of a texel, whose sums together stay as they are.
+/// Takes one step down `slopes` (by sums) for every lobe of a texel, whose mean normal stays as it is.
 fn move_lobes(
     family: impl Isotropic,
     lobes: &mut [Moving],

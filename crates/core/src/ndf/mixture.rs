@@ -163,9 +163,33 @@ pub(super) fn effective<'a>(
     lobe: &'a dyn Lobe,
     cosine: Cosine,
 ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
+    let cosine = argument(lobe, cosine);
     let widened: Vec<(f64, DVec3, AnyLobe)> =
-        lobes.iter().map(|l| (l.weight, l.mean, lobe.widen(l.variance))).collect();
-    Box::new(move |w| widened.iter().map(|(weight, mu, lobe)| weight * lobe.evaluate(cosine(w, *mu))).sum())
+        lobes.iter().map(|l| (l.weight, cosine.centre(l), lobe.widen(l.variance))).collect();
+    Box::new(move |w| {
+        widened.iter().map(|(weight, mu, lobe)| weight * lobe.evaluate((cosine.of)(w, *mu))).sum()
+    })
+}
+
+/// Argument of a BRDF under lobes of normals: the function, and whether means are lifted to the sphere for it.
+#[derive(Clone, Copy)]
+struct Argument {
+    of: Cosine,
+    lifted: bool,
+}
+
+impl Argument {
+    /// Centre of a lobe as the function takes it.
+    fn centre(self, lobe: &NormalLobe) -> DVec3 {
+        if self.lifted { lobe.direction() } else { lobe.mean }
+    }
+}
+
+/// Argument of a lobe of reflection. Diffuse light is no narrow lobe in the half-vector: it takes the cosine to
+/// the mean itself, on the sphere (Tan et al. 2005, section 4.1: `[mu · l]`).
+fn argument(lobe: &dyn Lobe, narrow: Cosine) -> Argument {
+    let lifted = lobe.slope_variance().is_none();
+    Argument { of: if lifted { cosine } else { narrow }, lifted }
 }
 
 /// Evaluates mixtures direction by direction, leaving out what lies beyond a lobe's reach.
@@ -201,13 +225,14 @@ where
     fn evaluate(&self, channels: &[f32], out: &mut [f64]) {
         out.fill(0.0);
         let (mut places, mut values) = (Vec::new(), Vec::new());
+        let cosine = argument(self.lobe, self.cosine);
         for lobe in (self.lobes)(channels) {
             let widened = self.lobe.widen(lobe.variance);
-            let least = least_cosine(&*widened);
+            let (least, centre) = (least_cosine(&*widened), cosine.centre(&lobe));
             places.clear();
             values.clear();
             for (i, w) in self.directions.iter().enumerate() {
-                let u = (self.cosine)(*w, lobe.mean);
+                let u = (cosine.of)(*w, centre);
                 if u >= least {
                     places.push(i);
                     values.push(u);
