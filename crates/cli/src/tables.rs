@@ -3,8 +3,11 @@
 use ndfmap::BakeReport;
 use ndfmap::choose::Choice;
 use ndfmap::compare::{Comparison, three_digits};
-use ndfmap::core::measure::FilteringError;
+use ndfmap::core::measure::{FilteringError, MAX_TEXELS};
 use ndfmap::render::{DriftReport, RenderReport};
+
+/// Error below which a table shows one digit, whose uncertainty tells nothing.
+const LEAST_SHOWN: f64 = 5e-4;
 
 /// Table of a comparison: a row a method, a column a level.
 pub(crate) fn comparison(comparison: &Comparison) -> String {
@@ -29,12 +32,26 @@ pub(crate) fn comparison(comparison: &Comparison) -> String {
         }
         text.push('\n');
     }
+    let sampled = rows.iter().flat_map(|row| row.levels.iter().map(move |e| (&row.method, e)));
+    let sampled = sampled.filter(|(_, e)| e.standard_error > 0.0 && e.error >= LEAST_SHOWN);
+    let least_sure = sampled
+        .max_by(|(_, a), (_, b)| (a.standard_error / a.error).total_cmp(&(b.standard_error / b.error)));
+    if let Some((method, e)) = least_sure {
+        text += &format!(
+            "\nlevels of more than {MAX_TEXELS} texels are sampled: standard errors are at most {:.1} % of the error \
+             ({method}, level {}, {} texels)\n",
+            100.0 * e.standard_error / e.error,
+            e.level,
+            e.texels
+        );
+    }
     if rows.iter().any(|row| !row.filtering.is_empty()) {
         text += "\nbetween texels (edges and corners): filtered, then by the reference path that shades every neighbour\n\n";
         for row in rows {
-            for (what, error) in
-                [("filtered", (|e| e.filtered) as fn(&FilteringError) -> f64), ("reference", |e| e.reference)]
-            {
+            for (what, error) in [
+                ("filtered", (|e| e.filtered.error) as fn(&FilteringError) -> f64),
+                ("reference", |e| e.reference.error),
+            ] {
                 text += &format!("{:name$} {what:>15}       -", row.method);
                 for e in &row.filtering {
                     text += &format!(" {:>6}", three_digits(error(e)));

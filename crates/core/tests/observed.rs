@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use ndfmap_core::bake::{Bake, BakeError, LevelSink, Place};
 use ndfmap_core::grid::Size;
-use ndfmap_core::measure::{TexelTruth, lattice_for, true_corners, true_levels};
+use ndfmap_core::measure::{BakedMap, TexelTruth, filtering_errors, lattice_for, level_errors};
 use ndfmap_core::ndf::{self, AnyMethod};
 use ndfmap_core::observe::{Cancelled, Observer};
 use ndfmap_core::procedural;
@@ -95,12 +95,15 @@ fn a_bake_that_is_to_stop_stops() {
 #[test]
 fn measures_that_are_to_stop_stop() {
     let (surface, lobe) = (surface(), BlinnPhong { exponent: Exponent::new(50.0).unwrap() });
-    let lattice = lattice_for(&lobe);
+    let lattice = lattice_for(&lobe).unwrap();
     let truth = TexelTruth::new(&*surface, &lobe, &lattice);
     let levels: Vec<usize> = (1..level_sizes(surface.size()).len()).collect();
+    let method = "toksvig".parse::<AnyMethod>().unwrap();
+    let pyramid = Bake::new(&*surface, &*method).to_pyramid().unwrap().0;
+    let maps = [BakedMap { pyramid: &pyramid, method: &*method }];
     for patience in [0, 10] {
-        assert_eq!(true_levels(&truth, &Watch::new(patience)).err(), Some(Cancelled));
-        let corners = true_corners(&truth, surface.wraps(), &levels, &Watch::new(patience));
+        assert_eq!(level_errors(&truth, &maps, &Watch::new(patience)).err(), Some(Cancelled));
+        let corners = filtering_errors(&truth, surface.wraps(), &levels, &maps, &Watch::new(patience));
         assert_eq!(corners.err(), Some(Cancelled));
     }
 }

@@ -8,7 +8,7 @@ use std::time::Instant;
 use ndfmap_core::bake::{Bake, MemorySink};
 use ndfmap_core::brdf::AnyLobe;
 use ndfmap_core::grid::Size;
-use ndfmap_core::measure::{TexelTruth, lattice_for, level_error, true_levels};
+use ndfmap_core::measure::{BakedMap, TexelTruth, lattice_for, level_errors};
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::procedural;
 use ndfmap_core::pyramid::{Layout, Precision, level_sizes};
@@ -51,12 +51,12 @@ fn timed(work: impl FnOnce()) -> f64 {
 fn error(spelling: &str) -> Result<f64, Box<dyn std::error::Error>> {
     let surface = (procedural::find("foil").ok_or("no foil")?.build)(Size::new(512, 512)?);
     let lobe = "blinn-phong:50".parse::<AnyLobe>()?;
-    let lattice = lattice_for(&*lobe);
+    let lattice = lattice_for(&*lobe)?;
     let truth = TexelTruth::new(&*surface, &*lobe, &lattice);
-    let level = true_levels(&truth, &|_| ())?.swap_remove(4);
     let method = spelling.parse::<AnyMethod>()?;
-    let bake = Bake::new(&*surface, &*method);
-    Ok(level_error(&bake.to_pyramid()?.0, &*method, &*lobe, &lattice, &level))
+    let pyramid = Bake::new(&*surface, &*method).to_pyramid()?.0;
+    let map = BakedMap { pyramid: &pyramid, method: &*method };
+    Ok(level_errors(&truth, &[map], &|_| ())?[0][4].error)
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -10,8 +10,9 @@ use std::time::Instant;
 use ndfmap_core::bake::{Bake, BakeError, MemorySink};
 use ndfmap_core::brdf::AnyLobe;
 use ndfmap_core::grid::{Grid, Size};
-use ndfmap_core::measure::{FilteringError, TexelTruth, filtering_error, lattice_for, true_corners};
+use ndfmap_core::measure::{BakedMap, FilteringError, TexelTruth, filtering_errors, lattice_for};
 use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::observe::Cancelled;
 use ndfmap_core::surface::{NormalGrid, Surface, SurfaceRow};
 use ndfmap_maps::source::{SourceOptions, read_source};
 
@@ -115,23 +116,18 @@ fn time(largest: usize, turns: usize) -> Result<(), Box<dyn std::error::Error>> 
 /// Errors of every method on a map: for each BRDF and level.
 fn measure(map: &Path) -> Result<Vec<Vec<Vec<FilteringError>>>, Box<dyn std::error::Error>> {
     let surface = load(map, MOST.min(setting("NDFMAP_BENCH_SIZE", MOST)))?;
-    let mut truths = Vec::new();
+    let methods = METHODS.map(str::parse::<AnyMethod>).into_iter().collect::<Result<Vec<_>, _>>()?;
+    let baked = |method: &AnyMethod| Ok::<_, Cancelled>(Bake::new(&surface, &**method).to_pyramid()?.0);
+    let pyramids = methods.iter().map(baked).collect::<Result<Vec<_>, _>>()?;
+    let map = |(pyramid, method)| BakedMap { pyramid, method };
+    let maps: Vec<BakedMap<'_>> = pyramids.iter().zip(methods.iter().map(|m| &**m)).map(map).collect();
+    let mut all = vec![Vec::new(); METHODS.len()];
     for lobe in LOBES {
         let lobe = lobe.parse::<AnyLobe>()?;
-        let lattice = lattice_for(&*lobe);
-        let corners =
-            true_corners(&TexelTruth::new(&surface, &*lobe, &lattice), surface.wraps(), &LEVELS, &|_| ())?;
-        truths.push((lobe, lattice, corners));
-    }
-    let mut all = Vec::new();
-    for spelling in METHODS {
-        let method = spelling.parse::<AnyMethod>()?;
-        let bake = Bake::new(&surface, &*method);
-        let (pyramid, _) = bake.to_pyramid()?;
-        let errors = truths.iter().map(|(lobe, lattice, corners)| {
-            corners.iter().map(|c| filtering_error(&pyramid, &*method, &**lobe, lattice, c)).collect()
-        });
-        all.push(errors.collect());
+        let lattice = lattice_for(&*lobe)?;
+        let truth = TexelTruth::new(&surface, &*lobe, &lattice);
+        let errors = filtering_errors(&truth, surface.wraps(), &LEVELS, &maps, &|_| ())?;
+        all.iter_mut().zip(errors).for_each(|(all, errors)| all.push(errors));
     }
     Ok(all)
 }
@@ -150,7 +146,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let line = of_method
                 .iter()
                 .flatten()
-                .map(|e| format!("{:.3}/{:.3}/{:.3}", e.texels, e.filtered, e.reference));
+                .map(|e| format!("{:.3}/{:.3}/{:.3}", e.texels.error, e.filtered.error, e.reference.error));
             println!("{spelling:16} {}", line.collect::<Vec<_>>().join(" "));
         }
     }
@@ -170,9 +166,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 };
                 median(errors.iter().flat_map(of_map).collect())
             };
-            let texels = ratio(|e| e.texels, |e| e.texels);
-            let between = ratio(|e| e.filtered, |e| e.filtered);
-            let reference = ratio(|e| e.reference, |e| e.filtered);
+            let texels = ratio(|e| e.texels.error, |e| e.texels.error);
+            let between = ratio(|e| e.filtered.error, |e| e.filtered.error);
+            let reference = ratio(|e| e.reference.error, |e| e.filtered.error);
             print!(" {texels:>12.3} {between:>8.3} {reference:>9.3}");
         }
         println!();

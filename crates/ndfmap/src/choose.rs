@@ -6,7 +6,7 @@
 
 use ndfmap_core::bake::Bake;
 use ndfmap_core::brdf::Lobe;
-use ndfmap_core::measure::{TexelTruth, filtering_error, lattice_for, true_corners};
+use ndfmap_core::measure::{BakedMap, FilteringError, TexelTruth, filtering_errors, lattice_for};
 use ndfmap_core::observe::Observer;
 use ndfmap_core::pyramid::{Precision, level_sizes};
 use ndfmap_core::surface::Surface;
@@ -115,22 +115,24 @@ impl Auto<'_> {
         })?;
         let mut levels: Vec<usize> = LEVELS.iter().map(|l| *l.min(&last)).collect();
         levels.dedup();
-        let lattice = lattice_for(self.lobe);
-        let corners = {
-            observer.begin("truth");
-            let truth = TexelTruth::new(self.surface, self.lobe, &lattice);
-            true_corners(&truth, self.surface.wraps(), &levels, observer)?
-        };
-        let mut candidates = Vec::new();
-        for method in methods {
-            let bytes = bytes_of(&method);
+        let lattice = lattice_for(self.lobe)?;
+        let mut pyramids = Vec::new();
+        for method in &methods {
             observer.begin(&method.to_string());
-            let bake = Bake::new(self.surface, &*method).precision(self.precision).observer(observer);
-            let (pyramid, _) = bake.to_pyramid()?;
-            let error = |truth| filtering_error(&pyramid, &*method, self.lobe, &lattice, truth).filtered;
-            let error = corners.iter().map(error).fold(0.0, f64::max);
-            candidates.push(Candidate { method: method.to_string(), bytes, error });
+            let bake = Bake::new(self.surface, &**method).precision(self.precision).observer(observer);
+            pyramids.push(bake.to_pyramid()?.0);
         }
+        observer.begin("errors");
+        let truth = TexelTruth::new(self.surface, self.lobe, &lattice);
+        let map = |(pyramid, method)| BakedMap { pyramid, method };
+        let maps: Vec<BakedMap<'_>> = pyramids.iter().zip(methods.iter().map(|m| &**m)).map(map).collect();
+        let errors = filtering_errors(&truth, self.surface.wraps(), &levels, &maps, observer)?;
+        let candidate = |(method, errors): (&AnyMethod, &Vec<FilteringError>)| Candidate {
+            method: method.to_string(),
+            bytes: bytes_of(method),
+            error: errors.iter().map(|e| e.filtered.error).fold(0.0, f64::max),
+        };
+        let mut candidates: Vec<Candidate> = methods.iter().zip(&errors).map(candidate).collect();
         candidates.sort_by(|a, b| {
             (a.bytes, a.error).partial_cmp(&(b.bytes, b.error)).unwrap_or(std::cmp::Ordering::Equal)
         });

@@ -7,7 +7,7 @@ use ndfmap_core::bake::Bake;
 use ndfmap_core::brdf::Lobe;
 use ndfmap_core::grid::Size;
 use ndfmap_core::measure::{
-    FilteringError, TexelTruth, filtering_error, lattice_for, level_error, true_corners, true_levels,
+    BakedMap, Estimate, FilteringError, TexelTruth, filtering_errors, lattice_for, level_errors,
 };
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::observe::Observer;
@@ -79,7 +79,7 @@ pub struct Row {
     /// Errors, one a level, finest first.
     pub levels: Vec<LevelError>,
     /// Errors between texels, where asked for.
-    #[serde(skip_serializing_if = "Vec::is_empty", serialize_with = "filtering_errors")]
+    #[serde(skip_serializing_if = "Vec::is_empty", serialize_with = "between_texels")]
     pub filtering: Vec<FilteringError>,
 }
 
@@ -90,6 +90,17 @@ pub struct LevelError {
     pub level: usize,
     /// Relative L2 error of the effective lobes, 0 for perfect ones.
     pub error: f64,
+    /// Standard error of that, 0 where all texels were measured.
+    pub standard_error: f64,
+    /// Texels measured.
+    pub texels: usize,
+}
+
+impl LevelError {
+    fn of(level: usize, estimate: &Estimate) -> Self {
+        let Estimate { error, standard_error, places } = *estimate;
+        Self { level, error, standard_error, texels: places }
+    }
 }
 
 /// Rows as an object with a key a method.
@@ -98,28 +109,34 @@ fn by_method<S: Serializer>(rows: &[Row], serializer: S) -> Result<S::Ok, S::Err
 }
 
 /// Errors between texels, by the names that scripts know.
-fn filtering_errors<S: Serializer>(errors: &[FilteringError], serializer: S) -> Result<S::Ok, S::Error> {
+fn between_texels<S: Serializer>(errors: &[FilteringError], serializer: S) -> Result<S::Ok, S::Error> {
     #[derive(Serialize)]
     struct Between {
         level: usize,
         texels: f64,
         between: f64,
         reference: f64,
+        /// Of the error between.
+        standard_error: f64,
+        corners: usize,
     }
     serializer.collect_seq(errors.iter().map(|e| Between {
         level: e.level,
-        texels: e.texels,
-        between: e.filtered,
-        reference: e.reference,
+        texels: e.texels.error,
+        between: e.filtered.error,
+        reference: e.reference.error,
+        standard_error: e.filtered.standard_error,
+        corners: e.filtered.places,
     }))
 }
 
 /// Bakes and measures.
 ///
 /// # Errors
-/// [`Error::Cancelled`] by the observer, and [`Error::Map`] for a baked map of another size.
+/// [`Error::Cancelled`] by the observer, [`Error::Map`] for a baked map of another size, and
+/// [`Error::Request`] for a lobe too narrow to be measured.
 pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Comparison, Error> {
-    let lattice = lattice_for(subject.lobe);
+    let lattice = lattice_for(subject.lobe)?;
     let size = subject.surface.size();
     let sizes = level_sizes(size);
     for BakedFile { path, map } in subject.baked {
@@ -132,39 +149,17 @@ pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Compari
             return Err(MapError::unsupported(path, reason).into());
         }
     }
-    observer.begin("truth");
-    let truth = TexelTruth::new(subject.surface, subject.lobe, &lattice);
-    let part = if subject.filtering { 0.5 } else { 1.0 };
-    let truths = true_levels(&truth, &observer.part(0.0, part))?;
-    // Level 0 is the map itself, filtered as maps have always been.
-    let levels: Vec<usize> = if subject.filtering { (1..sizes.len()).collect() } else { Vec::new() };
-    let corners = true_corners(&truth, subject.surface.wraps(), &levels, &observer.part(part, 1.0))?;
-    let measured = |method: &AnyMethod, pyramid: &Pyramid| Measured {
-        levels: truths
-            .iter()
-            .enumerate()
-            .map(|(level, truth)| LevelError {
-                level,
-                error: level_error(pyramid, &**method, subject.lobe, &lattice, truth),
-            })
-            .collect(),
-        filtering: corners
-            .iter()
-            .map(|truth| filtering_error(pyramid, &**method, subject.lobe, &lattice, truth))
-            .collect(),
-    };
     let mut rows = Vec::new();
+    let mut methods = Vec::new();
     for BakedFile { path, map } in subject.baked {
-        let method = map.method(path)?;
-        observer.begin(&path.display().to_string());
-        let Measured { levels, filtering } = measured(&method, &map.pyramid);
+        methods.push(map.method(path)?);
         rows.push(Row {
             method: path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
             bytes_per_texel: map.pyramid.layers() * map.pyramid.precision().texel_bytes(),
             bake_seconds: 0.0,
             pyramid: map.pyramid.clone(),
-            levels,
-            filtering,
+            levels: Vec::new(),
+            filtering: Vec::new(),
         });
     }
     for method in subject.methods {
@@ -172,25 +167,35 @@ pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Compari
         let start = Instant::now();
         let bake = Bake::new(subject.surface, &**method).precision(subject.precision).observer(observer);
         let (pyramid, _) = bake.to_pyramid()?;
-        let bake_seconds = start.elapsed().as_secs_f64();
-        let Measured { levels, filtering } = measured(method, &pyramid);
+        methods.push(method.clone());
         rows.push(Row {
             method: method.to_string(),
             bytes_per_texel: method.layers() * subject.precision.texel_bytes(),
-            bake_seconds,
-            levels,
-            filtering,
+            bake_seconds: start.elapsed().as_secs_f64(),
+            levels: Vec::new(),
+            filtering: Vec::new(),
             pyramid,
         });
     }
+    observer.begin("errors");
+    let truth = TexelTruth::new(subject.surface, subject.lobe, &lattice);
+    let maps: Vec<BakedMap<'_>> = rows
+        .iter()
+        .zip(&methods)
+        .map(|(row, method)| BakedMap { pyramid: &row.pyramid, method: &**method })
+        .collect();
+    let part = if subject.filtering { 0.5 } else { 1.0 };
+    let levels = level_errors(&truth, &maps, &observer.part(0.0, part))?;
+    // Level 0 is the map itself, filtered as maps have always been.
+    let between: Vec<usize> = if subject.filtering { (1..sizes.len()).collect() } else { Vec::new() };
+    let wraps = subject.surface.wraps();
+    let filtering = filtering_errors(&truth, wraps, &between, &maps, &observer.part(part, 1.0))?;
+    for ((row, levels), filtering) in rows.iter_mut().zip(levels).zip(filtering) {
+        row.levels = levels.iter().enumerate().map(|(level, e)| LevelError::of(level, e)).collect();
+        row.filtering = filtering;
+    }
     let (map, brdf) = (subject.name.to_owned(), subject.lobe.to_string());
     Ok(Comparison { map, width: size.width, height: size.height, brdf, sizes, rows })
-}
-
-/// Errors of one row.
-struct Measured {
-    levels: Vec<LevelError>,
-    filtering: Vec<FilteringError>,
 }
 
 /// A number in six columns, three significant digits where it matters.

@@ -1,6 +1,7 @@
 //! Errors of the library.
 
 use ndfmap_core::bake::BakeError;
+use ndfmap_core::measure::TooNarrow;
 use ndfmap_core::ndf::ParseMethodError;
 use ndfmap_core::observe::Cancelled;
 #[cfg(feature = "shaders")]
@@ -35,6 +36,12 @@ impl From<BakeError<MapError>> for Error {
             BakeError::Cancelled(cancelled) => Self::Cancelled(cancelled),
             BakeError::Sink(error) => Self::Map(error),
         }
+    }
+}
+
+impl From<TooNarrow> for Error {
+    fn from(error: TooNarrow) -> Self {
+        Self::Request(error.to_string())
     }
 }
 

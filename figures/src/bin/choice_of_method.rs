@@ -36,7 +36,7 @@ impl Measures {
     fn of(row: &Row) -> Self {
         let mean = |errors: Vec<f64>| errors.iter().sum::<f64>() / errors.len().max(1) as f64;
         let at = row.levels.iter().filter(|e| LEVELS.contains(&e.level)).map(|e| e.error);
-        let between = row.filtering.iter().filter(|e| LEVELS.contains(&e.level)).map(|e| e.filtered);
+        let between = row.filtering.iter().filter(|e| LEVELS.contains(&e.level)).map(|e| e.filtered.error);
         Self {
             at: mean(at.collect()),
             between: mean(between.collect()),

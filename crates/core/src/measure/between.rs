@@ -7,35 +7,25 @@
 //! lobe, by the width that its variance cannot hold.
 
 use glam::DVec2;
-use rand::{SeedableRng, seq::SliceRandom};
-use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
-use super::TexelTruth;
-use crate::brdf::Lobe;
+use super::estimate::{Estimate, Sampled, Squares};
+use super::texels::{BakedMap, TexelTruth, all_texels};
 use crate::grid::Size;
 use crate::lookup::{Tap, Texels};
-use crate::ndf::{Evaluator, Method};
+use crate::ndf::Evaluator;
 use crate::observe::{Cancelled, Observer};
 use crate::pyramid::{Pyramid, level_sizes};
-use crate::sphere::DiskLattice;
 use crate::surface::Wraps;
 
-/// Corners measured a level, at most; each with the edges to its right and below its texel.
+/// Corners drawn at a time of a level that has more; each has the edges to its right and below its texel.
 pub const SITES: usize = 64;
 
-/// A corner: the texel above left of it, the one to the right of that, the one below, and the one across.
-pub type Corner = [(usize, usize); 4];
+/// Most corners drawn of a level.
+pub const MOST_SITES: usize = 512;
 
-/// Corners of a level and the true lobes around them.
-pub struct TrueCorners {
-    /// The level.
-    pub level: usize,
-    size: Size,
-    corners: Vec<Corner>,
-    /// The true lobe of each of a corner's texels, at every direction of the lattice.
-    lobes: Vec<[Vec<f64>; 4]>,
-}
+/// A corner: the texel above left of it, the one to the right of that, the one below, and the one across.
+type Corner = [(usize, usize); 4];
 
 /// Relative L2 errors at corners and edges of one level.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,52 +33,73 @@ pub struct FilteringError {
     /// The level.
     pub level: usize,
     /// Error at the texels themselves, those around the same corners.
-    pub texels: f64,
+    pub texels: Estimate,
     /// Error between them, by the filtered channels.
-    pub filtered: f64,
+    pub filtered: Estimate,
     /// Error between them, by the reference path.
-    pub reference: f64,
+    pub reference: Estimate,
 }
 
-/// Corners of every level that has more than one texel, with their truth; the same for every method.
+/// The corner to the right of and below a texel.
+fn corner((x, y): (usize, usize), size: Size, wraps: Wraps) -> Corner {
+    let right = wraps.x.index(x as isize + 1, size.width);
+    let below = wraps.y.index(y as isize + 1, size.height);
+    [(x, y), (right, y), (x, below), (right, below)]
+}
+
+/// Errors of maps of one surface between the texels of levels, map by map; every map is measured at the same
+/// corners. Levels of one texel are left out.
+///
+/// A level of at most [`SITES`] corners is measured whole; of others corners are drawn as texels are by
+/// [`super::level_errors`], [`MOST_SITES`] at most. A method that cannot be filtered takes the reference path
+/// for both.
 ///
 /// # Errors
 /// [`Cancelled`] by the observer.
-pub fn true_corners(
+pub fn filtering_errors(
     truth: &TexelTruth<'_>,
     wraps: Wraps,
     levels: &[usize],
+    maps: &[BakedMap<'_>],
     observer: &dyn Observer,
-) -> Result<Vec<TrueCorners>, Cancelled> {
+) -> Result<Vec<Vec<FilteringError>>, Cancelled> {
     let sizes = level_sizes(truth.size());
-    let measured: Vec<usize> =
+    let levels: Vec<usize> =
         levels.iter().copied().filter(|l| sizes.get(*l).is_some_and(|s| s.area() > 1)).collect();
-    let of_level = |(done, level): (usize, &usize)| {
-        let corners = corners_of(sizes[*level], wraps, *level);
-        let true_lobes = |corner: &Corner| {
-            observer.check()?;
-            Ok(corner.map(|(x, y)| truth.texel(sizes[*level], x, y)))
+    let mut errors = vec![Vec::new(); maps.len()];
+    for (done, level) in levels.iter().enumerate() {
+        let size = sizes[*level];
+        let measured = |texels: &[(usize, usize)]| -> Result<Vec<Vec<Squares>>, Cancelled> {
+            let corners: Vec<Corner> = texels.iter().map(|at| corner(*at, size, wraps)).collect();
+            let around = truth.texels(size, corners.as_flattened(), observer)?;
+            let corners = Corners { level: *level, size, corners: &corners, lobes: around.as_chunks().0 };
+            Ok(maps.iter().flat_map(|map| corners.squares(truth, map)).collect())
         };
-        let lobes = corners.par_iter().map(true_lobes).collect::<Result<_, Cancelled>>()?;
-        observer.progress((done + 1) as f64 / measured.len() as f64);
-        Ok(TrueCorners { level: *level, size: sizes[*level], corners, lobes })
-    };
-    measured.iter().enumerate().map(of_level).collect()
+        let mut drawn = Sampled::new(FIGURES * maps.len());
+        if size.area() > SITES {
+            let draws = truth.draws(size);
+            while !drawn.is_enough(MOST_SITES.min(size.area())) {
+                let places = draws.draw(SITES, *level, drawn.batches);
+                let texels: Vec<(usize, usize)> = places.iter().map(|d| d.texel).collect();
+                drawn.add(&places, measured(&texels)?.into_iter());
+            }
+        }
+        let estimates = if drawn.batches == 0 || drawn.weights.len() >= size.area() {
+            measured(&all_texels(size))?.iter().map(|squares| Estimate::of(squares, None)).collect()
+        } else {
+            drawn.estimates()
+        };
+        for (errors, [texels, filtered, reference]) in errors.iter_mut().zip(estimates.as_chunks().0) {
+            let (texels, filtered, reference) = (*texels, *filtered, *reference);
+            errors.push(FilteringError { level: *level, texels, filtered, reference });
+        }
+        observer.progress((done + 1) as f64 / levels.len() as f64);
+    }
+    Ok(errors)
 }
 
-/// Corners of a level, drawn evenly with a fixed seed where there are many.
-fn corners_of(size: Size, wraps: Wraps, level: usize) -> Vec<Corner> {
-    let mut all: Vec<usize> = (0..size.area()).collect();
-    let mut random = Pcg64Mcg::seed_from_u64(level as u64);
-    let drawn = all.partial_shuffle(&mut random, SITES).0;
-    let corner = |i: &usize| {
-        let (x, y) = (i % size.width, i / size.width);
-        let right = wraps.x.index(x as isize + 1, size.width);
-        let below = wraps.y.index(y as isize + 1, size.height);
-        [(x, y), (right, y), (x, below), (right, below)]
-    };
-    drawn.iter().map(corner).collect()
-}
+/// Figures of a corner: at texels, filtered, by the reference path.
+const FIGURES: usize = 3;
 
 /// Places measured at a corner: which of its texels meet there, and where that is, in texels from the first
 /// one's corner.
@@ -110,73 +121,49 @@ pub fn evaluate_neighbours(
     }
 }
 
-/// The errors of a baked map between the texels of a level. A method that cannot be filtered takes the
-/// reference path for both.
-#[must_use]
-pub fn filtering_error(
-    pyramid: &Pyramid,
-    method: &dyn Method,
-    lobe: &dyn Lobe,
-    lattice: &DiskLattice,
-    truth: &TrueCorners,
-) -> FilteringError {
-    let evaluator = method.evaluator(lobe, &lattice.directions);
-    let level = truth.level;
-    let of_corner = |(corner, lobes): (&Corner, &[Vec<f64>; 4])| {
-        let mut sums = [Squares::default(); 3];
-        let mut out = vec![0.0; lattice.len()];
-        let mut channels = vec![0.0; pyramid.channels()];
-        for ((x, y), lobe) in corner.iter().zip(lobes) {
-            evaluator.evaluate(&pyramid.texel(level, *x, *y), &mut out);
-            sums[0].add(&out, lobe);
-        }
-        for (meeting, place) in PLACES {
-            let mut lobe = vec![0.0; lattice.len()];
-            for k in meeting {
-                lobe.iter_mut().zip(&lobes[*k]).for_each(|(sum, f)| *sum += f / meeting.len() as f64);
-            }
-            let (x, y) = corner[0];
-            let size = DVec2::new(truth.size.width as f64, truth.size.height as f64);
-            let uv = (DVec2::new(x as f64, y as f64) + place) / size;
-            evaluate_neighbours(pyramid, &*evaluator, (uv, level as f64), &mut out);
-            sums[2].add(&out, &lobe);
-            if method.filterable() {
-                channels.fill(0.0);
-                pyramid.bilinear(level, uv, 1.0, &mut channels);
-                evaluator.evaluate(&channels, &mut out);
-            }
-            sums[1].add(&out, &lobe);
-        }
-        sums
-    };
-    let all: Vec<[Squares; 3]> = truth.corners.par_iter().zip(&truth.lobes).map(of_corner).collect();
-    let error = |k: usize| {
-        let total = all.iter().fold(Squares::default(), |t, s| Squares {
-            difference: t.difference + s[k].difference,
-            norm: t.norm + s[k].norm,
-        });
-        total.relative()
-    };
-    FilteringError { level, texels: error(0), filtered: error(1), reference: error(2) }
+/// Corners of a level, with the true lobes of the four texels around each.
+struct Corners<'a> {
+    level: usize,
+    size: Size,
+    corners: &'a [Corner],
+    lobes: &'a [[Vec<f64>; 4]],
 }
 
-/// Sums of squares of a difference and of the truth.
-#[derive(Clone, Copy, Default)]
-struct Squares {
-    difference: f64,
-    norm: f64,
-}
-
-impl Squares {
-    fn add(&mut self, approx: &[f64], truth: &[f64]) {
-        for (a, t) in approx.iter().zip(truth) {
-            self.difference += (a - t) * (a - t);
-            self.norm += t * t;
-        }
-    }
-
-    fn relative(self) -> f64 {
-        if self.norm > 0.0 { (self.difference / self.norm).sqrt() } else { self.difference.sqrt() }
+impl Corners<'_> {
+    /// Sums of squares of a map: for each figure, of every corner.
+    fn squares(&self, truth: &TexelTruth<'_>, map: &BakedMap<'_>) -> [Vec<Squares>; FIGURES] {
+        let BakedMap { pyramid, method } = map;
+        let evaluator = method.evaluator(truth.lobe, &truth.lattice.directions);
+        let directions = truth.lattice.len();
+        let of_corner = |(corner, lobes): (&Corner, &[Vec<f64>; 4])| {
+            let mut sums = [Squares::default(); FIGURES];
+            let mut out = vec![0.0; directions];
+            let mut channels = vec![0.0; pyramid.channels()];
+            for ((x, y), lobe) in corner.iter().zip(lobes) {
+                evaluator.evaluate(&pyramid.texel(self.level, *x, *y), &mut out);
+                sums[0].add(&out, lobe);
+            }
+            for (meeting, place) in PLACES {
+                let mut lobe = vec![0.0; directions];
+                for k in meeting {
+                    lobe.iter_mut().zip(&lobes[*k]).for_each(|(sum, f)| *sum += f / meeting.len() as f64);
+                }
+                let (x, y) = corner[0];
+                let size = DVec2::new(self.size.width as f64, self.size.height as f64);
+                let uv = (DVec2::new(x as f64, y as f64) + place) / size;
+                evaluate_neighbours(pyramid, &*evaluator, (uv, self.level as f64), &mut out);
+                sums[2].add(&out, &lobe);
+                if method.filterable() {
+                    channels.fill(0.0);
+                    pyramid.bilinear(self.level, uv, 1.0, &mut channels);
+                    evaluator.evaluate(&channels, &mut out);
+                }
+                sums[1].add(&out, &lobe);
+            }
+            sums
+        };
+        let all: Vec<[Squares; FIGURES]> = self.corners.par_iter().zip(self.lobes).map(of_corner).collect();
+        std::array::from_fn(|k| all.iter().map(|sums| sums[k]).collect())
     }
 }
 
@@ -188,6 +175,7 @@ mod tests {
     use crate::measure::DISK_RADIUS;
     use crate::ndf::AnyMethod;
     use crate::procedural;
+    use crate::sphere::DiskLattice;
 
     /// Errors at level 3 of a built-in map.
     fn errors(map: &str, method: &str) -> FilteringError {
@@ -195,24 +183,24 @@ mod tests {
         let lobe = "blinn-phong:50".parse::<AnyLobe>().unwrap();
         let lattice = DiskLattice::new(40, DISK_RADIUS);
         let truth = TexelTruth::new(&*surface, &*lobe, &lattice);
-        let corners = true_corners(&truth, surface.wraps(), &[3], &|_| ()).unwrap();
         let method = method.parse::<AnyMethod>().unwrap();
-        let bake = Bake::new(&*surface, &*method);
-        filtering_error(&bake.to_pyramid().unwrap().0, &*method, &*lobe, &lattice, &corners[0])
+        let pyramid = Bake::new(&*surface, &*method).to_pyramid().unwrap().0;
+        let map = BakedMap { pyramid: &pyramid, method: &*method };
+        filtering_errors(&truth, surface.wraps(), &[3], &[map], &|_| ()).unwrap()[0][0]
     }
 
     #[test]
     fn what_is_linear_needs_no_reference_path() {
         // Spherical harmonics are linear up to the clamp at zero, so both paths are the same.
         let e = errors("foil", "sh:7");
-        assert!((e.filtered - e.reference).abs() < 0.02 * e.reference, "{e:?}");
+        assert!((e.filtered.error - e.reference.error).abs() < 0.02 * e.reference.error, "{e:?}");
     }
 
     #[test]
     fn misaligned_lobes_show_between_texels_and_aligned_ones_hardly() {
         let (un, aligned) = (errors("foil", "vmf:4:unaligned"), errors("foil", "vmf:4"));
-        assert!(un.filtered > 2.0 * un.reference, "{un:?}");
-        assert!(aligned.filtered < 0.6 * un.filtered, "{aligned:?} {un:?}");
+        assert!(un.filtered.error > 2.0 * un.reference.error, "{un:?}");
+        assert!(aligned.filtered.error < 0.6 * un.filtered.error, "{aligned:?} {un:?}");
     }
 
     #[test]
@@ -220,10 +208,10 @@ mod tests {
         let [un, matched, parent] =
             ["unaligned", "matched", "parent"].map(|a| errors("foil", &format!("vmf:4:{a}")));
         assert!(
-            matched.filtered < un.filtered && parent.filtered < matched.filtered,
+            matched.filtered.error < un.filtered.error && parent.filtered.error < matched.filtered.error,
             "{un:?} {matched:?} {parent:?}"
         );
         // The fit is the same, only the order of lobes is not.
-        assert!((matched.texels - un.texels).abs() < 0.02 * un.texels);
+        assert!((matched.texels.error - un.texels.error).abs() < 0.02 * un.texels.error);
     }
 }

@@ -1,11 +1,12 @@
 //! Errors of a baked map against the truth: at its texels, level by level, and between them.
 
 mod between;
+mod estimate;
 mod texels;
 
-pub use between::{
-    Corner, FilteringError, SITES, TrueCorners, evaluate_neighbours, filtering_error, true_corners,
-};
+pub use between::{FilteringError, MOST_SITES, SITES, evaluate_neighbours, filtering_errors};
+pub use estimate::Estimate;
 pub use texels::{
-    DISK_RADIUS, MAX_TEXELS, SAMPLED_TEXELS, TexelTruth, TrueLevel, lattice_for, level_error, true_levels,
+    BakedMap, DISK_RADIUS, MAX_TEXELS, MOST_SAMPLED, SAMPLED_TEXELS, TexelTruth, TooNarrow, TrueLevel,
+    lattice_for, level_errors,
 };

@@ -5,11 +5,12 @@
 //! `error = |approx - truth| / |truth|`, both norms over texels and over directions spread evenly on the
 //! unit disk of `w.xy`, radius below 0.97.
 
+use std::ops::RangeInclusive;
+
 use glam::DVec3;
-use rand::{SeedableRng, seq::SliceRandom};
-use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
+use super::estimate::{Draws, Estimate, Sampled, Squares};
 use crate::brdf::Lobe;
 use crate::grid::Size;
 use crate::ndf::Method;
@@ -21,29 +22,54 @@ use crate::surface::{Surface, SurfaceRow};
 /// Directions with `w.xy` beyond this radius are left out: at the horizon slopes blow up.
 pub const DISK_RADIUS: f64 = 0.97;
 
-/// Most texels of a level that are all measured; of more, [`SAMPLED_TEXELS`] are drawn evenly.
+/// Most texels of a level that are all measured without drawing some first.
 pub const MAX_TEXELS: usize = 512;
 
-/// Texels drawn from a level that has more than [`MAX_TEXELS`].
+/// Texels drawn at a time from a level that has more than [`MAX_TEXELS`].
 pub const SAMPLED_TEXELS: usize = 256;
 
-/// The directions that suit a lobe: a lattice of at least 1.4 points per deviation, within bounds.
+/// Most texels drawn of a level.
+pub const MOST_SAMPLED: usize = 4096;
+
+/// Points a side of the lattice of directions: enough for any wide lobe, and most, for the narrowest.
+const SIDES: RangeInclusive<f64> = 48.0..=320.0;
+
+/// Lobe too narrow for errors to be measured.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "`{lobe}` is too narrow to be measured: it deviates by {deviation:.2e}, and errors are taken at directions \
+     {step:.2e} apart, between which it would fall; take a wider lobe"
+)]
+pub struct TooNarrow {
+    /// Spelling of the lobe.
+    pub lobe: String,
+    /// Deviation of its slopes on one axis.
+    pub deviation: f64,
+    /// Least step between directions.
+    pub step: f64,
+}
+
+/// The directions that suit a lobe: a lattice of at least 1.4 points per deviation; for the narrowest lobes of
+/// one point or more.
 ///
-/// 48 a side are enough for any wide lobe; 160 keep the narrowest affordable, and being an even sample
-/// they stay unbiased when they are sparse.
-#[must_use]
-pub fn lattice_for(lobe: &dyn Lobe) -> DiskLattice {
+/// # Errors
+/// [`TooNarrow`] for a lobe that could fall between the points.
+pub fn lattice_for(lobe: &dyn Lobe) -> Result<DiskLattice, TooNarrow> {
     let deviation = lobe.slope_variance().map_or(1.0, |v| v.get().sqrt());
-    let side = (2.0 / (0.7 * deviation)).ceil().clamp(48.0, 160.0);
-    DiskLattice::new(side as usize, DISK_RADIUS)
+    let step = 2.0 / SIDES.end();
+    if deviation < step {
+        return Err(TooNarrow { lobe: lobe.to_string(), deviation, step });
+    }
+    let side = (2.0 / (0.7 * deviation)).ceil().clamp(*SIDES.start(), *SIDES.end());
+    Ok(DiskLattice::new(side as usize, DISK_RADIUS))
 }
 
 /// Fine normals in memory, and the BRDF and directions the truth is asked for.
 pub struct TexelTruth<'a> {
     size: Size,
     normals: Vec<[f32; 3]>,
-    lobe: &'a dyn Lobe,
-    lattice: &'a DiskLattice,
+    pub(super) lobe: &'a dyn Lobe,
+    pub(super) lattice: &'a DiskLattice,
     /// Half-angle beyond which the lobe is below 1e-12 of its peak.
     reach: f64,
 }
@@ -132,66 +158,143 @@ fn reach(lobe: &dyn Lobe) -> f64 {
     far
 }
 
-/// Texels of one level and their true lobes.
+/// All texels of one level and their true lobes.
 pub struct TrueLevel {
     /// The level.
     pub level: usize,
-    /// Texels measured.
+    /// Texels, row by row.
     pub texels: Vec<(usize, usize)>,
     /// The true effective lobe of each, at every direction of the lattice.
     pub lobes: Vec<Vec<f64>>,
 }
 
-/// The true lobes of every level.
-///
-/// Levels with more than [`MAX_TEXELS`] texels are sampled, with a fixed seed, so that two methods are
-/// measured on the same texels. A level in whose texels those of a finer one nest is averaged from it.
-///
-/// # Errors
-/// [`Cancelled`] by the observer.
-pub fn true_levels(truth: &TexelTruth<'_>, observer: &dyn Observer) -> Result<Vec<TrueLevel>, Cancelled> {
-    let sizes = level_sizes(truth.size);
-    let mut levels: Vec<TrueLevel> = Vec::with_capacity(sizes.len());
-    for (level, size) in sizes.iter().enumerate() {
-        let texels = measured_texels(*size, level);
-        // The coarsest finer level that was measured whole and whose texels nest in this one's.
-        let nested = levels.iter().rev().find(|finer| {
+/// Map to be measured.
+#[derive(Clone, Copy)]
+pub struct BakedMap<'a> {
+    /// The levels.
+    pub pyramid: &'a Pyramid,
+    /// Method that made them.
+    pub method: &'a dyn Method,
+}
+
+/// Texels of a level of `size`, all of them.
+pub(super) fn all_texels(size: Size) -> Vec<(usize, usize)> {
+    (0..size.area()).map(|i| (i % size.width, i / size.width)).collect()
+}
+
+impl TexelTruth<'_> {
+    /// All texels of a level. They are averaged from a finer level, where one is given whose texels nest in
+    /// these.
+    ///
+    /// # Errors
+    /// [`Cancelled`] by the observer.
+    pub fn level(
+        &self,
+        level: usize,
+        finer: Option<&TrueLevel>,
+        observer: &dyn Observer,
+    ) -> Result<TrueLevel, Cancelled> {
+        let sizes = level_sizes(self.size);
+        let (size, texels) = (sizes[level], all_texels(sizes[level]));
+        let nested = finer.filter(|finer| {
             let fine = sizes[finer.level];
-            finer.texels.len() == fine.area()
-                && fine.width.is_multiple_of(size.width)
-                && fine.height.is_multiple_of(size.height)
+            fine.width.is_multiple_of(size.width) && fine.height.is_multiple_of(size.height)
         });
         let lobes = match nested {
             Some(finer) => {
-                texels.par_iter().map(|t| mean_of_nested(finer, sizes[finer.level], *size, *t)).collect()
+                texels.par_iter().map(|t| mean_of_nested(finer, sizes[finer.level], size, *t)).collect()
             }
-            None => {
-                let lobe = |(x, y): &(usize, usize)| {
-                    observer.check()?;
-                    Ok(truth.texel(*size, *x, *y))
-                };
-                texels.par_iter().map(lobe).collect::<Result<_, Cancelled>>()?
-            }
+            None => self.texels(size, &texels, observer)?,
         };
-        levels.push(TrueLevel { level, texels, lobes });
-        observer.progress((level + 1) as f64 / sizes.len() as f64);
+        Ok(TrueLevel { level, texels, lobes })
     }
-    Ok(levels)
+
+    /// True lobes of some texels of a level.
+    pub(super) fn texels(
+        &self,
+        size: Size,
+        texels: &[(usize, usize)],
+        observer: &dyn Observer,
+    ) -> Result<Vec<Vec<f64>>, Cancelled> {
+        let lobe = |(x, y): &(usize, usize)| {
+            observer.check()?;
+            Ok(self.texel(size, *x, *y))
+        };
+        texels.par_iter().map(lobe).collect()
+    }
+
+    /// Draws of a level's texels.
+    pub(super) fn draws(&self, size: Size) -> Draws {
+        let spread = |i: usize| {
+            let (rows, row_weight) = footprint(self.size.height, size.height, i / size.width);
+            let mut mean = DVec3::ZERO;
+            for j in rows {
+                let (columns, weight) = footprint(self.size.width, size.width, i % size.width);
+                for i in columns {
+                    let n = DVec3::from_array(self.normals[j * self.size.width + i].map(f64::from));
+                    mean += row_weight(j) * weight(i) * n;
+                }
+            }
+            (1.0 - mean.length_squared()).max(0.0)
+        };
+        Draws::new(size, (0..size.area()).into_par_iter().map(spread).collect())
+    }
 }
 
-fn measured_texels(size: Size, level: usize) -> Vec<(usize, usize)> {
-    let at = |i: usize| (i % size.width, i / size.width);
-    if size.area() <= MAX_TEXELS {
-        return (0..size.area()).map(at).collect();
+/// Errors of maps of one surface at every level, map by map; each map is measured at the same texels.
+///
+/// A level of at most [`MAX_TEXELS`] texels is measured whole. Of others texels are drawn, more of them where
+/// normals vary, until the standard error of every map's error is below a fiftieth of it, or
+/// [`MOST_SAMPLED`] are drawn, or as many as there are: then all are measured.
+///
+/// # Errors
+/// [`Cancelled`] by the observer.
+pub fn level_errors(
+    truth: &TexelTruth<'_>,
+    maps: &[BakedMap<'_>],
+    observer: &dyn Observer,
+) -> Result<Vec<Vec<Estimate>>, Cancelled> {
+    let sizes = level_sizes(truth.size);
+    let mut errors = vec![Vec::with_capacity(sizes.len()); maps.len()];
+    let mut finer: Option<TrueLevel> = None;
+    for (level, size) in sizes.iter().enumerate() {
+        let mut drawn = Sampled::new(maps.len());
+        if size.area() > MAX_TEXELS {
+            let draws = truth.draws(*size);
+            while !drawn.is_enough(MOST_SAMPLED.min(size.area())) {
+                let places = draws.draw(SAMPLED_TEXELS, level, drawn.batches);
+                let texels: Vec<(usize, usize)> = places.iter().map(|d| d.texel).collect();
+                let lobes = truth.texels(*size, &texels, observer)?;
+                let batch = TrueLevel { level, texels, lobes };
+                drawn.add(&places, maps.iter().map(|map| squares(truth, map, &batch)));
+            }
+        }
+        let estimates = if drawn.batches == 0 || drawn.weights.len() >= size.area() {
+            let whole = truth.level(level, finer.as_ref(), observer)?;
+            let own = maps.iter().map(|map| Estimate::of(&squares(truth, map, &whole), None)).collect();
+            // Coarser ones are averaged from the finest that is whole, unless they do not nest in it.
+            finer = Some(whole);
+            own
+        } else {
+            drawn.estimates()
+        };
+        errors.iter_mut().zip(estimates).for_each(|(errors, estimate)| errors.push(estimate));
+        observer.progress((level + 1) as f64 / sizes.len() as f64);
     }
-    let mut random = Pcg64Mcg::seed_from_u64(level as u64);
-    if size.area() <= 1 << 20 {
-        let mut all: Vec<usize> = (0..size.area()).collect();
-        return all.partial_shuffle(&mut random, SAMPLED_TEXELS).0.iter().map(|i| at(*i)).collect();
-    }
-    // On large levels a repeated draw is too rare to matter, and stays unbiased.
-    use rand::RngExt;
-    (0..SAMPLED_TEXELS).map(|_| at(random.random_range(0..size.area()))).collect()
+    Ok(errors)
+}
+
+/// Sums of squares of every texel, all of a level or some.
+fn squares(truth: &TexelTruth<'_>, map: &BakedMap<'_>, level: &TrueLevel) -> Vec<Squares> {
+    let evaluator = map.method.evaluator(truth.lobe, &truth.lattice.directions);
+    let of = |((x, y), lobe): (&(usize, usize), &Vec<f64>)| {
+        let mut approx = vec![0.0; lobe.len()];
+        evaluator.evaluate(&map.pyramid.texel(level.level, *x, *y), &mut approx);
+        let mut sums = Squares::default();
+        sums.add(&approx, lobe);
+        sums
+    };
+    level.texels.par_iter().zip(&level.lobes).map(of).collect()
 }
 
 fn mean_of_nested(finer: &TrueLevel, fine: Size, coarse: Size, (x, y): (usize, usize)) -> Vec<f64> {
@@ -206,31 +309,6 @@ fn mean_of_nested(finer: &TrueLevel, fine: Size, coarse: Size, (x, y): (usize, u
     mean
 }
 
-/// The error of a baked map at one level.
-#[must_use]
-pub fn level_error(
-    pyramid: &Pyramid,
-    method: &dyn Method,
-    lobe: &dyn Lobe,
-    lattice: &DiskLattice,
-    truth: &TrueLevel,
-) -> f64 {
-    let evaluator = method.evaluator(lobe, &lattice.directions);
-    let sums: Vec<(f64, f64)> = truth
-        .texels
-        .par_iter()
-        .zip(&truth.lobes)
-        .map(|((x, y), lobe)| {
-            let mut approx = vec![0.0; lobe.len()];
-            evaluator.evaluate(&pyramid.texel(truth.level, *x, *y), &mut approx);
-            let square = |f: &dyn Fn(usize) -> f64| (0..lobe.len()).map(|i| f(i).powi(2)).sum::<f64>();
-            (square(&|i| approx[i] - lobe[i]), square(&|i| lobe[i]))
-        })
-        .collect();
-    let (difference, norm) = sums.iter().fold((0.0, 0.0), |(d, n), (a, b)| (d + a, n + b));
-    if norm > 0.0 { (difference / norm).sqrt() } else { difference.sqrt() }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -240,7 +318,7 @@ mod tests {
     #[test]
     fn culling_changes_nothing() {
         let lobe = "blinn-phong:200".parse::<AnyLobe>().unwrap();
-        let lattice = lattice_for(&*lobe);
+        let lattice = lattice_for(&*lobe).unwrap();
         let surface = (procedural::find("armour").unwrap().build)(Size::new(32, 32).unwrap());
         let mut truth = TexelTruth::new(&*surface, &*lobe, &lattice);
         assert!(truth.reach < 1.0);
@@ -253,16 +331,43 @@ mod tests {
     }
 
     #[test]
+    fn lobes_that_would_fall_between_directions_are_refused() {
+        for (spelling, measured) in
+            [("lambert", true), ("ggx:0.01", true), ("ggx:0.003", false), ("blinn-phong:100000", false)]
+        {
+            let lobe = spelling.parse::<AnyLobe>().unwrap();
+            let lattice = lattice_for(&*lobe);
+            assert_eq!(lattice.is_ok(), measured, "{spelling}");
+            if let Err(error) = lattice {
+                assert!(error.to_string().contains(spelling), "{error}");
+            }
+        }
+        // A flat map is right under the narrowest lobe that is measured.
+        let lobe = "ggx:0.01".parse::<AnyLobe>().unwrap();
+        let lattice = lattice_for(&*lobe).unwrap();
+        let normals = crate::grid::Grid::from_fn(Size::new(4, 4).unwrap(), |_, _| glam::Vec3::Z);
+        let flat = crate::surface::NormalGrid { normals, wraps: crate::surface::Wraps::default() };
+        let method = "vmf:1".parse::<crate::ndf::AnyMethod>().unwrap();
+        let pyramid = crate::bake::Bake::new(&flat, &*method).to_pyramid().unwrap().0;
+        let truth = TexelTruth::new(&flat, &*lobe, &lattice);
+        let maps = [BakedMap { pyramid: &pyramid, method: &*method }];
+        for estimate in &level_errors(&truth, &maps, &|_| ()).unwrap()[0] {
+            assert!(estimate.error < 1e-6 && estimate.standard_error == 0.0, "{estimate:?}");
+        }
+    }
+
+    #[test]
     fn nested_levels_equal_direct_ones() {
         let lobe = "blinn-phong:30".parse::<AnyLobe>().unwrap();
         let lattice = DiskLattice::new(16, DISK_RADIUS);
         let surface = (procedural::find("foil").unwrap().build)(Size::new(32, 32).unwrap());
         let truth = TexelTruth::new(&*surface, &*lobe, &lattice);
-        let levels = true_levels(&truth, &|_| ()).unwrap();
-        for level in &levels[2..] {
-            let size = Size::new(32 >> level.level, 32 >> level.level).unwrap();
-            let direct = truth.texel(size, 0, 0);
-            assert!(direct.iter().zip(&level.lobes[0]).all(|(a, b)| (a - b).abs() < 1e-12));
+        let finer = truth.level(1, None, &|_| ()).unwrap();
+        for level in 2..6 {
+            let size = Size::new(32 >> level, 32 >> level).unwrap();
+            let (direct, nested) =
+                (truth.texel(size, 0, 0), truth.level(level, Some(&finer), &|_| ()).unwrap());
+            assert!(direct.iter().zip(&nested.lobes[0]).all(|(a, b)| (a - b).abs() < 1e-12));
         }
     }
 }

@@ -119,6 +119,14 @@ fn on_sphere(g: ptr<function, Decoded>, base: f32, energy: f32, w: vec3<f32>) ->
     return scale * energy / flat_integral(v) * generator(d);
 }
 
+// Covariance on a plane (xx, yy, xy) with the pivots held at `least` or above, as those of a restriction of a
+// Gaussian with that base roughness are but for rounding.
+fn held_above(c: vec3<f32>, least: f32) -> vec3<f32> {
+    let xx = max(c.x, least);
+    let along = c.z / xx;
+    return vec3<f32>(xx, max(c.y - along * c.z, least) + along * c.z, c.z);
+}
+
 // The density on the plane through the mean, projected from the centre of the sphere.
 fn on_plane(g: ptr<function, Decoded>, base: f32, energy: f32, w: vec3<f32>) -> f32 {
     let mu = direction_or_up((*g).mean);
@@ -136,11 +144,11 @@ fn on_plane(g: ptr<function, Decoded>, base: f32, energy: f32, w: vec3<f32>) -> 
     let am = dot(p.d * a, m);
     let bm = dot(p.d * b, m);
     let mm = dot(p.d * m, m);
-    let covariance = vec3<f32>(
+    let covariance = held_above(vec3<f32>(
         dot(p.d * a, a) - am * am / mm,
         dot(p.d * b, b) - bm * bm / mm,
         dot(p.d * a, b) - am * bm / mm,
-    );
+    ), lobe_variance(base));
     let d = vec2<f32>(dot(w, axes.a), dot(w, axes.b)) * short / u;
     let onto = short * short / (u * u * u);
     if KERNEL == BRDF_KERNEL {

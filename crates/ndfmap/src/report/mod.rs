@@ -117,7 +117,7 @@ fn page(pages: &Pages<'_>, figures: &Figures<'_>) -> Result<String, Error> {
         .iter()
         .filter(|row| !row.filtering.is_empty())
         .map(|row| {
-            let cell = |e: &FilteringError| format!("{} / {}", three_digits(e.filtered), three_digits(e.reference));
+            let cell = |e: &FilteringError| format!("{} / {}", three_digits(e.filtered.error), three_digits(e.reference.error));
             context! { method => row.method.clone(), cells => row.filtering.iter().map(cell).collect::<Vec<_>>() }
         })
         .collect();
