@@ -4,6 +4,8 @@
 
 use std::sync::Mutex;
 
+use ndfmap::compare::{Subject, compare};
+use ndfmap::core::brdf::AnyLobe;
 use ndfmap::core::grid::{Grid, Size};
 use ndfmap::core::lookup::Lookups;
 use ndfmap::core::ndf::{AnyMethod, Slopes, Vmf};
@@ -126,4 +128,43 @@ fn every_piece_of_a_rendering_runs_forwards_to_its_end_and_can_be_stopped() {
         render(&nothing, &Device::Cpu, &Unobserved, &mut |_, _| Ok(())),
         Err(Error::Request(_))
     ));
+}
+
+#[test]
+fn errors_say_how_sure_they_are() {
+    let options = SourceOptions { builtin_size: Size { width: 64, height: 64 }, ..SourceOptions::default() };
+    let map = read_source("builtin:foil".as_ref(), &options).unwrap();
+    let methods = ["toksvig", "vmf:2"].map(|m| m.parse::<AnyMethod>().unwrap());
+    let compared = |lobe: &str| {
+        let lobe = lobe.parse::<AnyLobe>().unwrap();
+        let subject = Subject {
+            name: "foil",
+            surface: &*map.surface,
+            lobe: &*lobe,
+            methods: &methods,
+            baked: &[],
+            precision: Precision::Half,
+            filtering: true,
+        };
+        compare(&subject, &Unobserved)
+    };
+    let comparison = compared("blinn-phong:50").unwrap();
+    for row in &comparison.rows {
+        // 64 × 64 and 32 × 32 texels are sampled, or measured whole; 16 × 16 and fewer are whole.
+        for e in &row.levels {
+            let all = 4096 >> (2 * e.level);
+            assert!(e.texels <= all && (e.level < 2) >= (e.standard_error > 0.0), "{} {e:?}", row.method);
+            assert!(
+                e.standard_error <= (0.02 * e.error).max(5e-4) || e.texels == 4096,
+                "{} {e:?}",
+                row.method
+            );
+        }
+        for e in &row.filtering {
+            assert!(e.filtered.places <= 512 && (e.level < 4) >= (e.filtered.standard_error > 0.0), "{e:?}");
+        }
+    }
+    assert!(!serde_json::to_string(&comparison).unwrap().contains("null"));
+    let refused = compared("ggx:0.003").unwrap_err();
+    assert!(matches!(&refused, Error::Request(said) if said.contains("too narrow")), "{refused}");
 }

@@ -81,11 +81,16 @@ pub fn filtering_errors(
             while !drawn.is_enough(MOST_SITES.min(size.area())) {
                 let places = draws.draw(SITES, *level, drawn.batches);
                 let texels: Vec<(usize, usize)> = places.iter().map(|d| d.texel).collect();
-                drawn.add(&places, measured(&texels)?.into_iter());
+                drawn.add(&places, measured(&texels)?);
             }
         }
         let estimates = if drawn.batches == 0 || drawn.weights.len() >= size.area() {
-            measured(&all_texels(size))?.iter().map(|squares| Estimate::of(squares, None)).collect()
+            // In parts: all lobes around many corners at once are gigabytes.
+            let mut whole = vec![Vec::new(); FIGURES * maps.len()];
+            for texels in all_texels(size).chunks(SITES) {
+                whole.iter_mut().zip(measured(texels)?).for_each(|(all, own)| all.extend(own));
+            }
+            whole.iter().map(|squares| Estimate::of(squares, None)).collect()
         } else {
             drawn.estimates()
         };

@@ -145,7 +145,7 @@ impl Sampled {
         Self { batches: 0, weights: Vec::new(), squares: vec![Vec::new(); figures] }
     }
 
-    pub(super) fn add(&mut self, drawn: &[Drawn], squares: impl Iterator<Item = Vec<Squares>>) {
+    pub(super) fn add(&mut self, drawn: &[Drawn], squares: Vec<Vec<Squares>>) {
         self.batches += 1;
         self.weights.extend(drawn.iter().map(|d| d.weight));
         self.squares.iter_mut().zip(squares).for_each(|(all, own)| all.extend(own));

@@ -264,17 +264,23 @@ pub fn level_errors(
             while !drawn.is_enough(MOST_SAMPLED.min(size.area())) {
                 let places = draws.draw(SAMPLED_TEXELS, level, drawn.batches);
                 let texels: Vec<(usize, usize)> = places.iter().map(|d| d.texel).collect();
-                let lobes = truth.texels(*size, &texels, observer)?;
-                let batch = TrueLevel { level, texels, lobes };
-                drawn.add(&places, maps.iter().map(|map| squares(truth, map, &batch)));
+                drawn.add(&places, measured(truth, maps, level, texels, observer)?);
             }
         }
-        let estimates = if drawn.batches == 0 || drawn.weights.len() >= size.area() {
+        let estimates = if drawn.batches == 0 {
             let whole = truth.level(level, finer.as_ref(), observer)?;
             let own = maps.iter().map(|map| Estimate::of(&squares(truth, map, &whole), None)).collect();
-            // Coarser ones are averaged from the finest that is whole, unless they do not nest in it.
+            // Coarser ones are averaged from it where they nest in it.
             finer = Some(whole);
             own
+        } else if drawn.weights.len() >= size.area() {
+            // In parts: all lobes of a large level at once are gigabytes.
+            let mut whole = vec![Vec::new(); maps.len()];
+            for texels in all_texels(*size).chunks(SAMPLED_TEXELS) {
+                let own = measured(truth, maps, level, texels.to_vec(), observer)?;
+                whole.iter_mut().zip(own).for_each(|(all, own)| all.extend(own));
+            }
+            whole.iter().map(|squares| Estimate::of(squares, None)).collect()
         } else {
             drawn.estimates()
         };
@@ -282,6 +288,19 @@ pub fn level_errors(
         observer.progress((level + 1) as f64 / sizes.len() as f64);
     }
     Ok(errors)
+}
+
+/// Sums of squares of some texels of a level, map by map.
+fn measured(
+    truth: &TexelTruth<'_>,
+    maps: &[BakedMap<'_>],
+    level: usize,
+    texels: Vec<(usize, usize)>,
+    observer: &dyn Observer,
+) -> Result<Vec<Vec<Squares>>, Cancelled> {
+    let lobes = truth.texels(level_sizes(truth.size)[level], &texels, observer)?;
+    let part = TrueLevel { level, texels, lobes };
+    Ok(maps.iter().map(|map| squares(truth, map, &part)).collect())
 }
 
 /// Sums of squares of every texel, all of a level or some.
