@@ -369,7 +369,7 @@ fn textures_lie_each_by_its_own_transform() {
     let none = json!({});
     // Transforms of normals and colours; width and height of the map; the map's scale on the mesh; red of its
     // first row, x of its first row's normals: 0 where flat, 1 where steep.
-    let cases: [(_, _, _, _, &[u8], &[u8]); 5] = [
+    let cases: [(_, _, _, _, &[u8], &[u8]); 6] = [
         (none.clone(), none.clone(), (2, 1), 1.0, &[1, 0], &[0, 1]),
         // Colours that repeat more often are averaged over the texels of the normal map.
         (none.clone(), json!({ "offset": [0.5, 0.0] }), (2, 1), 1.0, &[0, 1], &[0, 1]),
@@ -384,6 +384,8 @@ fn textures_lie_each_by_its_own_transform() {
             &[1, 2, 0, 1, 2, 0],
             &[0, 1, 0, 1, 0, 1],
         ),
+        // 3 to 2 without a common coordinate: two repetitions of the colours, three of the normals.
+        (json!({ "scale": [1.5, 1] }), none.clone(), (6, 2), 0.5, &[1, 2, 0, 1, 2, 0], &[0, 1, 0, 1, 0, 1]),
         // A texture that lies twice as wide as the coordinates are: both go by its own.
         (json!({ "scale": [0.5, 1] }), none, (2, 1), 0.5, &[2, 2], &[0, 1]),
     ];
@@ -445,7 +447,7 @@ fn what_is_laid_on_otherwise_or_left_out_is_said() {
         assert!(warnings.iter().any(|w| w.contains(reason)), "{reason}: {warnings:?}");
     };
     let other = |json: &mut serde_json::Value| {
-        let extension = serde_json::json!({ "KHR_texture_transform": { "scale": [2.5, 1] } });
+        let extension = serde_json::json!({ "KHR_texture_transform": { "scale": [2.57, 1] } });
         json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = extension;
     };
     warned(other, "do not go on together");

@@ -9,6 +9,10 @@ use ndfmap_core::surface::{Surface, Wrap, Wraps};
 use super::material::only_normal;
 use super::relay::{Laid, Placing, Repeated, is_near};
 
+/// Most repetitions of a texture along a side of the map in which it lies: scales of 2.5 and 1 go into one map
+/// as 5 and 2.
+const MOST_TOGETHER: u32 = 8;
+
 /// Laying of a texture on a mesh: its set of coordinates, their transform, and its continuation beyond the
 /// edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,6 +33,12 @@ impl Laying {
     /// Coordinates of the mesh as coordinates of the texture.
     pub(super) fn apply(&self, uv: Vec2) -> Vec2 {
         self.transform.transform_point2(DVec2::from(uv)).as_vec2()
+    }
+
+    /// Laying of this many repetitions along each side, seen as one texture.
+    fn together(self, times: u32) -> Self {
+        let scale = DVec2::splat(1.0 / f64::from(times));
+        Self { transform: DAffine2::from_scale(scale) * self.transform, ..self }
     }
 
     /// Placing of the texture as seen from a map; `None` where the two do not go on together.
@@ -82,10 +92,13 @@ pub(super) struct Arranged {
 
 impl Textures {
     /// The textures as the first of them lies by which all others can be laid: the normal map, the colours,
-    /// the roughness, or the plain coordinates.
+    /// the roughness, or the plain coordinates; else as several of its repetitions lie together.
     pub(super) fn arranged(self) -> Arranged {
         let layings = self.layings();
-        let found = layings.iter().chain([&Laying::PLAIN]).find_map(|map| self.placings(map));
+        let found = (1..=MOST_TOGETHER).find_map(|times| {
+            let mut maps = layings.iter().chain([&Laying::PLAIN]).map(|laying| laying.together(times));
+            maps.find_map(|map| self.placings(&map))
+        });
         let first = layings.first().copied().unwrap_or(Laying::PLAIN);
         let faithful = found.is_some();
         let Placings { map, normals, base, metal_rough } = found.unwrap_or(Placings::alike(first));
