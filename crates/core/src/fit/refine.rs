@@ -18,9 +18,10 @@
 //! the lobe alone, times how crowded its place is. This objective is ours, not the papers' (`docs/methods.md`
 //! has what it gains).
 //!
-//! Diffuse light asks for little but the mean normal, which EM keeps: a texel's sums together are the means of
-//! its normals' statistics. So the mean is *kept*: each step is brought back to it, by the least increase of `E`.
-//! Without that the lobes of a foil are ten times worse under Lambert, and highlights gain nothing by it.
+//! Diffuse light asks for little but the mean normal, which EM keeps: a texel's sums together are the means
+//! of its normals' statistics. So the mean is *kept*: each step is brought back to it, by the least increase
+//! of `E`. Without that the lobes of a foil are ten times worse under Lambert, and in the median of ten maps
+//! highlights gain nothing by it.
 
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
@@ -191,9 +192,9 @@ fn total(sums: &[[f32; 4]]) -> [f32; 4] {
     out
 }
 
-/// Compliance of a lobe: the inverse of half the curvature of `E` by each of `(ln alpha, mu, v)`. The curvature
-/// is that of the lobe by itself, `alpha²/(4 pi v)` by `ln alpha`, over `2v` by mu, over `2v²` by v, times how
-/// crowded its place is.
+/// Compliance of a lobe: the inverse of half the curvature of `E` by each of `(ln alpha, mu, v)`. The
+/// curvature is that of the lobe by itself, `alpha²/(4 pi v)` by `ln alpha`, over `2v` by mu, over `2v²` by
+/// v, times how crowded its place is.
 fn compliance(shape: &Shape, crowded: f32) -> [f32; 5] {
     let v = shape.variance + LOBE_VARIANCE;
     let curvature = crowded * shape.alpha * shape.alpha / (2.0 * std::f32::consts::TAU * v);
@@ -201,8 +202,8 @@ fn compliance(shape: &Shape, crowded: f32) -> [f32; 5] {
     [curvature.recip(), by_mean, by_mean, by_mean, v * by_mean]
 }
 
-/// Moves the lobes of a texel so that their mean normal is the one that is kept, by the least increase of `E` in
-/// the measure of its curvature: Newton's step for the constraint, `H⁻¹ Jᵀ (J H⁻¹ Jᵀ)⁻¹`.
+/// Moves the lobes of a texel so that their mean normal is the one that is kept, by the least increase of `E`
+/// in the measure of its curvature: Newton's step for the constraint, `H⁻¹ Jᵀ (J H⁻¹ Jᵀ)⁻¹`.
 fn keep<F: Isotropic>(family: F, lobes: &mut [Moving], crowded: &[f32; MAX_LOBES], kept: &[f32; 4]) {
     let mut rows = [[[0.0_f32; 5]; 4]; MAX_LOBES];
     let mut matrix = [[0.0_f64; 4]; 4];

@@ -1,8 +1,9 @@
 //! Estimates of an error from some of its places, with their standard error.
 //!
-//! The squared error of a level is a ratio `Σ d_i / Σ t_i` over its places: squares of differences over squares
-//! of the truth. Places that are drawn with probability `p_i` count `1/p_i` times, and the ratio's standard
-//! error is that of the residuals `(d_i - r² t_i)/p_i` over the sum below (Cochran 1977, sections 6.3 and 9A.3).
+//! The squared error of a level is a ratio `Σ d_i / Σ t_i` over its places: squares of differences over
+//! squares of the truth. Places that are drawn with probability `p_i` count `1/p_i` times, and the ratio's
+//! standard error is that of the residuals `(d_i - r² t_i)/p_i` over the sum below (Cochran 1977,
+//! chapters 6 and 9A).
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;

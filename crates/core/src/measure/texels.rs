@@ -49,8 +49,8 @@ pub struct TooNarrow {
     pub step: f64,
 }
 
-/// The directions that suit a lobe: a lattice of at least 1.4 points per deviation; for the narrowest lobes of
-/// one point or more.
+/// The directions that suit a lobe: a lattice of at least 1.4 points per deviation; for the narrowest lobes
+/// of one point or more.
 ///
 /// # Errors
 /// [`TooNarrow`] for a lobe that could fall between the points.

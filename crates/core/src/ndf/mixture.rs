@@ -171,7 +171,8 @@ pub(super) fn effective<'a>(
     })
 }
 
-/// Argument of a BRDF under lobes of normals: the function, and whether means are lifted to the sphere for it.
+/// Argument of a BRDF under lobes of normals: the function, and whether means are lifted to the sphere for
+/// it.
 #[derive(Clone, Copy)]
 struct Argument {
     of: Cosine,
@@ -185,8 +186,8 @@ impl Argument {
     }
 }
 
-/// Argument of a lobe of reflection. Diffuse light is no narrow lobe in the half-vector: it takes the cosine to
-/// the mean itself, on the sphere (Tan et al. 2005, section 4.1: `[mu · l]`).
+/// Argument of a lobe of reflection. Diffuse light is no narrow lobe in the half-vector: it takes the cosine
+/// to the mean itself, on the sphere (Tan et al. 2005, section 4.1: `[mu · l]`).
 fn argument(lobe: &dyn Lobe, narrow: Cosine) -> Argument {
     let lifted = lobe.slope_variance().is_none();
     Argument { of: if lifted { cosine } else { narrow }, lifted }

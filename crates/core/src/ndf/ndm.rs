@@ -241,8 +241,8 @@ fn with_pivots_above(m: DMat3, floor: f64) -> DMat3 {
     outer(c0, d0) + outer(c1, d1) + outer(DVec3::Z, d2)
 }
 
-/// Covariance on a plane (xx, yy, xy) with the pivots held at `floor` or above, as those of a restriction of a
-/// Gaussian with that base roughness are but for rounding: differences of nearly equal numbers.
+/// Covariance on a plane (xx, yy, xy) with the pivots held at `floor` or above, as those of a restriction of
+/// a Gaussian with that base roughness are but for rounding: differences of nearly equal numbers.
 fn held_above([xx, yy, xy]: [f64; 3], floor: f64) -> [f64; 3] {
     let xx = xx.max(floor);
     let along = xy / xx;
@@ -555,8 +555,8 @@ mod tests {
 
     #[test]
     fn sharp_lobes_on_a_plane_stay_numbers() {
-        // One steep normal and pairs of them: rounding to half floats is all the covariance that is left, or far
-        // more than the lobe's own.
+        // One steep normal and pairs of them: rounding to half floats is all the covariance that is left, or
+        // far more than the lobe's own.
         for i in 0..200 {
             let (x, y) = (f32::sin(1.3 * i as f32), f32::cos(2.1 * i as f32));
             let normals = [Vec3::new(x, y, 0.3).normalize(), Vec3::new(y, 0.9 * x, 0.4).normalize()];
@@ -573,7 +573,8 @@ mod tests {
                     let (effective, peak) = (ndm.effective(&g, &*lobe), lobe.evaluate(1.0));
                     for n in [g.mean.normalize(), normals[0].as_dvec3().normalize()] {
                         let f = effective(n);
-                        // No wider lobe is brighter than the flat map's; kernels of their own have other peaks.
+                        // No wider lobe is brighter than the flat map's; kernels of their own have other
+                        // peaks.
                         assert!((0.0..=2.0 * peak).contains(&f), "{i} {kernel} {spelling}: {f} of {peak}");
                     }
                 }

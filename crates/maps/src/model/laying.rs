@@ -9,8 +9,8 @@ use ndfmap_core::surface::{Surface, Wrap, Wraps};
 use super::material::only_normal;
 use super::relay::{Laid, Placing, Repeated, is_near};
 
-/// Most repetitions of a texture along a side of the map in which it lies: scales of 2.5 and 1 go into one map
-/// as 5 and 2.
+/// Most repetitions of a texture along a side of the map in which it lies: scales of 2.5 and 1 go into one
+/// map as 5 and 2.
 const MOST_TOGETHER: u32 = 8;
 
 /// Laying of a texture on a mesh: its set of coordinates, their transform, and its continuation beyond the

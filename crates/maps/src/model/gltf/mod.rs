@@ -1,11 +1,11 @@
 //! glTF 2.0 by the `gltf` crate: meshes in the pose of the file, and metallic-roughness materials.
 //!
 //! It reads positions, normals, tangents and coordinates in every type (`KHR_mesh_quantization`), compressed
-//! too (`EXT_meshopt_compression`, `KHR_meshopt_compression`), the normal texture with its scale, base colour,
-//! metalness and roughness, factors and textures, each with its `KHR_texture_transform`, and one colour for
-//! all vertices of a primitive. Colours and roughness are averaged over the texels of the normal map. It
-//! does not read animation, skins, morphs, colours that vary from vertex to vertex, occlusion, emission,
-//! alpha, cameras and lights.
+//! too (`EXT_meshopt_compression`, `KHR_meshopt_compression`), the normal texture with its scale, base
+//! colour, metalness and roughness, factors and textures, each with its `KHR_texture_transform`, and one
+//! colour for all vertices of a primitive. Colours and roughness are averaged over the texels of the normal
+//! map. It does not read animation, skins, morphs, colours that vary from vertex to vertex, occlusion,
+//! emission, alpha, cameras and lights.
 
 mod accessors;
 mod document;
