@@ -3,11 +3,8 @@
 use ndfmap::BakeReport;
 use ndfmap::choose::Choice;
 use ndfmap::compare::{Comparison, three_digits};
-use ndfmap::core::measure::{FilteringError, MAX_TEXELS};
+use ndfmap::core::measure::{Estimate, FilteringError, SURE, UNSEEN};
 use ndfmap::render::{DriftReport, RenderReport};
-
-/// Error below which a table shows one digit, whose uncertainty tells nothing.
-const LEAST_SHOWN: f64 = 5e-4;
 
 /// Table of a comparison: a row a method, a column a level.
 pub(crate) fn comparison(comparison: &Comparison) -> String {
@@ -32,19 +29,6 @@ pub(crate) fn comparison(comparison: &Comparison) -> String {
         }
         text.push('\n');
     }
-    let sampled = rows.iter().flat_map(|row| row.levels.iter().map(move |e| (&row.method, e)));
-    let sampled = sampled.filter(|(_, e)| e.standard_error > 0.0 && e.error >= LEAST_SHOWN);
-    let least_sure = sampled
-        .max_by(|(_, a), (_, b)| (a.standard_error / a.error).total_cmp(&(b.standard_error / b.error)));
-    if let Some((method, e)) = least_sure {
-        text += &format!(
-            "\nlevels of more than {MAX_TEXELS} texels are sampled: standard errors are at most {:.1} % of the error \
-             ({method}, level {}, {} texels)\n",
-            100.0 * e.standard_error / e.error,
-            e.level,
-            e.texels
-        );
-    }
     if rows.iter().any(|row| !row.filtering.is_empty()) {
         text += "\nbetween texels (edges and corners): filtered, then by the reference path that shades every neighbour\n\n";
         for row in rows {
@@ -60,7 +44,35 @@ pub(crate) fn comparison(comparison: &Comparison) -> String {
             }
         }
     }
-    text
+    text + &certainty(comparison)
+}
+
+/// Line that says how sure the errors of a comparison are; empty where all texels were measured.
+fn certainty(comparison: &Comparison) -> String {
+    let figures = comparison.rows.iter().flat_map(|row| {
+        let at = row.levels.iter().map(|e| (e.level, "", e.estimate()));
+        let between = row.filtering.iter().map(|e| (e.level, " between texels", e.filtered));
+        at.chain(between).map(move |(level, place, estimate)| (&row.method, level, place, estimate))
+    });
+    let sampled: Vec<_> = figures.filter(|(.., e)| e.standard_error > 0.0).collect();
+    if sampled.is_empty() {
+        return String::new();
+    }
+    let part = |e: &Estimate| e.standard_error / e.error;
+    let unsure = sampled.iter().filter(|(.., e)| !e.is_sure());
+    let worst = unsure.max_by(|(.., a), (.., b)| part(a).total_cmp(&part(b)));
+    let but = worst.map(|(method, level, place, e)| {
+        format!(
+            ", but for up to {:.1} % ({method}, level {level}{place}, {} places)",
+            100.0 * part(e),
+            e.places
+        )
+    });
+    format!(
+        "\nlarge levels are sampled: standard errors are at most {:.0} % of the error or {UNSEEN}{}\n",
+        100.0 * SURE,
+        but.unwrap_or_default()
+    )
 }
 
 /// Table of a rendering: a row a method, and a line a truth.

@@ -6,7 +6,7 @@
 
 use ndfmap_core::bake::Bake;
 use ndfmap_core::brdf::Lobe;
-use ndfmap_core::measure::{BakedMap, FilteringError, TexelTruth, filtering_errors, lattice_for};
+use ndfmap_core::measure::{BakedMap, Estimate, FilteringError, TexelTruth, filtering_errors, lattice_for};
 use ndfmap_core::observe::Observer;
 use ndfmap_core::pyramid::{Precision, level_sizes};
 use ndfmap_core::surface::Surface;
@@ -66,6 +66,8 @@ pub struct Candidate {
     pub bytes: usize,
     /// Error between texels, the worse of the levels.
     pub error: f64,
+    /// Standard error of that, 0 where all corners were measured.
+    pub standard_error: f64,
 }
 
 /// Choice that was made, with its reason.
@@ -127,10 +129,10 @@ impl Auto<'_> {
         let map = |(pyramid, method)| BakedMap { pyramid, method };
         let maps: Vec<BakedMap<'_>> = pyramids.iter().zip(methods.iter().map(|m| &**m)).map(map).collect();
         let errors = filtering_errors(&truth, self.surface.wraps(), &levels, &maps, observer)?;
-        let candidate = |(method, errors): (&AnyMethod, &Vec<FilteringError>)| Candidate {
-            method: method.to_string(),
-            bytes: bytes_of(method),
-            error: errors.iter().map(|e| e.filtered.error).fold(0.0, f64::max),
+        let candidate = |(method, errors): (&AnyMethod, &Vec<FilteringError>)| {
+            let worst = errors.iter().map(|e| e.filtered).max_by(|a, b| a.error.total_cmp(&b.error));
+            let Estimate { error, standard_error, .. } = worst.unwrap_or_default();
+            Candidate { method: method.to_string(), bytes: bytes_of(method), error, standard_error }
         };
         let mut candidates: Vec<Candidate> = methods.iter().zip(&errors).map(candidate).collect();
         candidates.sort_by(|a, b| {
@@ -182,7 +184,7 @@ mod tests {
 
     fn candidates() -> Vec<Candidate> {
         [("naive", 8, 0.9), ("slopes", 16, 0.3), ("vmf:2", 16, 0.35), ("vmf:4", 32, 0.1)]
-            .map(|(m, bytes, error)| Candidate { method: m.to_owned(), bytes, error })
+            .map(|(m, bytes, error)| Candidate { method: m.to_owned(), bytes, error, standard_error: 0.0 })
             .into()
     }
 

@@ -101,6 +101,13 @@ impl LevelError {
         let Estimate { error, standard_error, places } = *estimate;
         Self { level, error, standard_error, texels: places }
     }
+
+    /// The error as an estimate.
+    #[must_use]
+    pub fn estimate(&self) -> Estimate {
+        let Self { error, standard_error, texels: places, .. } = *self;
+        Estimate { error, standard_error, places }
+    }
 }
 
 /// Rows as an object with a key a method.

@@ -11,10 +11,10 @@ use rand_pcg::Pcg64Mcg;
 use crate::grid::Size;
 
 /// Standard error, as a part of the error, below which no more places are drawn.
-const SURE: f64 = 0.02;
+pub const SURE: f64 = 0.02;
 
-/// Standard error that does not show in three decimals.
-const UNSEEN: f64 = 5e-4;
+/// Standard error that does not show in three decimals, below which no more places are drawn either.
+pub const UNSEEN: f64 = 5e-4;
 
 /// Share of the places that are drawn evenly; the others are drawn by how much normals vary under them.
 const EVEN: f64 = 0.5;

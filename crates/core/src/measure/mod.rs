@@ -5,8 +5,8 @@ mod estimate;
 mod texels;
 
 pub use between::{FilteringError, MOST_SITES, SITES, evaluate_neighbours, filtering_errors};
-pub use estimate::Estimate;
+pub use estimate::{Estimate, SURE, UNSEEN};
 pub use texels::{
-    BakedMap, DISK_RADIUS, MAX_TEXELS, MOST_SAMPLED, SAMPLED_TEXELS, TexelTruth, TooNarrow, TrueLevel,
-    lattice_for, level_errors,
+    BakedMap, DISK_RADIUS, MAX_TEXELS, MOST_SAMPLED, SAMPLED_TEXELS, TexelTruth, TooNarrow, lattice_for,
+    level_errors,
 };

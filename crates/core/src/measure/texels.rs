@@ -159,13 +159,13 @@ fn reach(lobe: &dyn Lobe) -> f64 {
 }
 
 /// All texels of one level and their true lobes.
-pub struct TrueLevel {
+struct TrueLevel {
     /// The level.
-    pub level: usize,
+    level: usize,
     /// Texels, row by row.
-    pub texels: Vec<(usize, usize)>,
+    texels: Vec<(usize, usize)>,
     /// The true effective lobe of each, at every direction of the lattice.
-    pub lobes: Vec<Vec<f64>>,
+    lobes: Vec<Vec<f64>>,
 }
 
 /// Map to be measured.
@@ -185,10 +185,7 @@ pub(super) fn all_texels(size: Size) -> Vec<(usize, usize)> {
 impl TexelTruth<'_> {
     /// All texels of a level. They are averaged from a finer level, where one is given whose texels nest in
     /// these.
-    ///
-    /// # Errors
-    /// [`Cancelled`] by the observer.
-    pub fn level(
+    fn level(
         &self,
         level: usize,
         finer: Option<&TrueLevel>,
@@ -264,12 +261,13 @@ pub fn level_errors(
             while !drawn.is_enough(MOST_SAMPLED.min(size.area())) {
                 let places = draws.draw(SAMPLED_TEXELS, level, drawn.batches);
                 let texels: Vec<(usize, usize)> = places.iter().map(|d| d.texel).collect();
-                drawn.add(&places, measured(truth, maps, level, texels, observer)?);
+                drawn.add(&places, measured(truth, maps, level, &texels, observer)?);
             }
         }
         let estimates = if drawn.batches == 0 {
             let whole = truth.level(level, finer.as_ref(), observer)?;
-            let own = maps.iter().map(|map| Estimate::of(&squares(truth, map, &whole), None)).collect();
+            let of_map = |map| squares(truth, map, level, &whole.texels, &whole.lobes);
+            let own = maps.iter().map(|map| Estimate::of(&of_map(map), None)).collect();
             // Coarser ones are averaged from it where they nest in it.
             finer = Some(whole);
             own
@@ -277,7 +275,7 @@ pub fn level_errors(
             // In parts: all lobes of a large level at once are gigabytes.
             let mut whole = vec![Vec::new(); maps.len()];
             for texels in all_texels(*size).chunks(SAMPLED_TEXELS) {
-                let own = measured(truth, maps, level, texels.to_vec(), observer)?;
+                let own = measured(truth, maps, level, texels, observer)?;
                 whole.iter_mut().zip(own).for_each(|(all, own)| all.extend(own));
             }
             whole.iter().map(|squares| Estimate::of(squares, None)).collect()
@@ -295,25 +293,30 @@ fn measured(
     truth: &TexelTruth<'_>,
     maps: &[BakedMap<'_>],
     level: usize,
-    texels: Vec<(usize, usize)>,
+    texels: &[(usize, usize)],
     observer: &dyn Observer,
 ) -> Result<Vec<Vec<Squares>>, Cancelled> {
-    let lobes = truth.texels(level_sizes(truth.size)[level], &texels, observer)?;
-    let part = TrueLevel { level, texels, lobes };
-    Ok(maps.iter().map(|map| squares(truth, map, &part)).collect())
+    let lobes = truth.texels(level_sizes(truth.size)[level], texels, observer)?;
+    Ok(maps.iter().map(|map| squares(truth, map, level, texels, &lobes)).collect())
 }
 
-/// Sums of squares of every texel, all of a level or some.
-fn squares(truth: &TexelTruth<'_>, map: &BakedMap<'_>, level: &TrueLevel) -> Vec<Squares> {
+/// Sums of squares of a map's texels against their true lobes.
+fn squares(
+    truth: &TexelTruth<'_>,
+    map: &BakedMap<'_>,
+    level: usize,
+    texels: &[(usize, usize)],
+    lobes: &[Vec<f64>],
+) -> Vec<Squares> {
     let evaluator = map.method.evaluator(truth.lobe, &truth.lattice.directions);
     let of = |((x, y), lobe): (&(usize, usize), &Vec<f64>)| {
         let mut approx = vec![0.0; lobe.len()];
-        evaluator.evaluate(&map.pyramid.texel(level.level, *x, *y), &mut approx);
+        evaluator.evaluate(&map.pyramid.texel(level, *x, *y), &mut approx);
         let mut sums = Squares::default();
         sums.add(&approx, lobe);
         sums
     };
-    level.texels.par_iter().zip(&level.lobes).map(of).collect()
+    texels.par_iter().zip(lobes).map(of).collect()
 }
 
 fn mean_of_nested(finer: &TrueLevel, fine: Size, coarse: Size, (x, y): (usize, usize)) -> Vec<f64> {

@@ -555,7 +555,7 @@ mod tests {
 
     #[test]
     fn sharp_lobes_on_a_plane_stay_numbers() {
-        // One steep normal and pairs of them: rounding to half floats is all the covariance that is left, or
+        // Steep normals, alone and in pairs: rounding to half floats is all the covariance that is left, or
         // far more than the lobe's own.
         for i in 0..200 {
             let (x, y) = (f32::sin(1.3 * i as f32), f32::cos(2.1 * i as f32));

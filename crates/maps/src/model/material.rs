@@ -44,7 +44,7 @@ impl MetalRough {
         if !self.textures.faithful {
             warnings.push(format!(
                 "textures of `{}` lie in ways that do not go on together (other coordinates or edges, or \
-                 scales that are no whole multiples): all are laid on as its normal map, or without one as \
+                 scales in no ratio of small whole numbers): all are laid on as its normal map, or without one as \
                  its colours",
                 self.name
             ));

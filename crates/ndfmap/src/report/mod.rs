@@ -117,7 +117,8 @@ fn page(pages: &Pages<'_>, figures: &Figures<'_>) -> Result<String, Error> {
         .iter()
         .filter(|row| !row.filtering.is_empty())
         .map(|row| {
-            let cell = |e: &FilteringError| format!("{} / {}", three_digits(e.filtered.error), three_digits(e.reference.error));
+            let both = |e: &FilteringError| [e.filtered, e.reference].map(|e| three_digits(e.error));
+            let cell = |e: &FilteringError| both(e).join(" / ");
             context! { method => row.method.clone(), cells => row.filtering.iter().map(cell).collect::<Vec<_>>() }
         })
         .collect();
