@@ -9,7 +9,8 @@ use ndfmap::render::{DriftReport, RenderReport};
 /// Table of a comparison: a row a method, a column a level.
 pub(crate) fn comparison(comparison: &Comparison) -> String {
     let (rows, brdf) = (&comparison.rows, &comparison.brdf);
-    let name = rows.iter().map(|r| r.method.len()).max().unwrap_or(0).max("level".len());
+    let longest = if comparison.factoring.is_empty() { "level" } else { "factors" };
+    let name = rows.iter().map(|r| r.method.len()).max().unwrap_or(0).max(longest.len());
     let mut text = format!("relative L2 error of the effective lobe against the truth, {brdf}\n\n");
     text += &format!("{:name$}  bytes  bake ms", "level");
     for (level, _) in comparison.sizes.iter().enumerate() {
@@ -28,6 +29,13 @@ pub(crate) fn comparison(comparison: &Comparison) -> String {
             text += &format!(" {:>6}", three_digits(level.error));
         }
         text.push('\n');
+    }
+    if !comparison.factoring.is_empty() {
+        text += &format!("{:name$}               ", "factors");
+        for level in &comparison.factoring {
+            text += &format!(" {:>6}", three_digits(level.error));
+        }
+        text += "\nfactors: the normals as they are, shaded by the factors of the material, which methods shade by\n";
     }
     if rows.iter().any(|row| !row.filtering.is_empty()) {
         text += "\nbetween texels (edges and corners): filtered, then by the reference path that shades every neighbour\n\n";

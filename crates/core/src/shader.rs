@@ -95,6 +95,11 @@ impl LobeTable {
         Self { entries: vec![[0.0; TABLE_ROUGHNESSES + 1]; entries] }
     }
 
+    /// Tables one after the other.
+    pub(crate) fn concat(tables: &[Self]) -> Self {
+        Self { entries: tables.iter().flat_map(|table| table.entries.clone()).collect() }
+    }
+
     /// Sets the numbers of the lobe at a roughness, counted from the least.
     pub fn set(&mut self, roughness: usize, numbers: &[f64]) {
         self.entries.iter_mut().zip(numbers).for_each(|(entry, number)| entry[roughness] = *number as f32);

@@ -129,8 +129,9 @@ impl Environments {
             return Ok((self.dark.clone(), self.dark_cube.clone()));
         };
         let split_sum = split_sum();
-        let size = Size { width: 2 * ENTRIES, height: ENTRIES + 1 };
-        let table = self.table("what a material reflects of a white sky", size, &split_sum.texels())?;
+        let texels = split_sum.texels();
+        let size = Size { width: 2 * ENTRIES, height: texels.len() / (2 * ENTRIES) };
+        let table = self.table("what a material reflects of a white sky", size, &texels)?;
         if environment.technique != Technique::Prefiltered {
             return Ok((table, self.dark_cube.clone()));
         }

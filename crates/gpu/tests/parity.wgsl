@@ -27,7 +27,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) g
     let directions = directions_between(input[first + 3u].xyz, input[first + 4u].xyz);
     let plain = SurfaceParams(b.xyz, b.w, c.xyz);
     var decoded = decode(&channels);
-    let light = reflect_texel(&channels, &decoded, plain, brdf, directions);
+    let light = reflect_channels(&channels, &decoded, plain, brdf, directions);
     output[3u * i] = vec4<f32>(light, facet(brdf, input[first + 5u].xyz, plain, directions).x);
     let widened = lobe_widen(a.x, b.w);
     output[3u * i + 1u] = vec4<f32>(

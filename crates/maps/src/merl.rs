@@ -7,9 +7,8 @@
 
 use std::path::Path;
 
-use glam::DVec3;
-use ndfmap_core::brdf::Measured;
 use ndfmap_core::brdf::measured::BINS;
+use ndfmap_core::brdf::{Measured, MeasuredTable};
 
 use crate::MapError;
 use crate::formats::read_file;
@@ -68,9 +67,8 @@ pub fn parse_merl(path: &Path, bytes: &[u8]) -> Result<(Measured, usize), MapErr
     if missing == 3 * VALUES {
         return Err(MapError::invalid(path, "holds no value that is not negative"));
     }
-    let reflectance = |_wi, _wo, bin| {
-        let rgb = [0, 1, 2].map(|c| value(c, bin));
-        rgb.into_iter().all(good).then(|| DVec3::from(rgb))
-    };
-    Ok((Measured::new(&format!("merl:{}", path.display()), TURNS, reflectance), missing))
+    let rgb = |bin: usize| [0, 1, 2].map(|c| value(c, bin) as f32);
+    let table = MeasuredTable::new(TURNS, (0..VALUES).map(rgb).collect())
+        .unwrap_or_else(|_| unreachable!("one value for each bin"));
+    Ok((Measured::new(&format!("merl:{}", path.display()), table), missing))
 }

@@ -56,7 +56,7 @@ fn error(spelling: &str) -> Result<f64, Box<dyn std::error::Error>> {
     let method = spelling.parse::<AnyMethod>()?;
     let pyramid = Bake::new(&*surface, &*method).to_pyramid()?.0;
     let map = BakedMap { pyramid: &pyramid, method: &*method };
-    Ok(level_errors(&truth, &[map], &|_| ())?[0][4].error)
+    Ok(level_errors(&truth, &[map], &|_| ())?.maps[0][4].error)
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

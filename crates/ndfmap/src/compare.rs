@@ -7,7 +7,7 @@ use ndfmap_core::bake::Bake;
 use ndfmap_core::brdf::Lobe;
 use ndfmap_core::grid::Size;
 use ndfmap_core::measure::{
-    BakedMap, Estimate, FilteringError, TexelTruth, filtering_errors, lattice_for, level_errors,
+    BakedMap, Estimate, FilteringError, LevelErrors, TexelTruth, filtering_errors, lattice_for, level_errors,
 };
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::observe::Observer;
@@ -58,6 +58,10 @@ pub struct Comparison {
     /// Sizes of the levels, finest first.
     #[serde(skip)]
     pub sizes: Vec<Size>,
+    /// Error that factoring a measured material makes by itself, one a level: that of the normals as they
+    /// are, shaded by its factors. Empty for other lobes.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub factoring: Vec<LevelError>,
     /// Maps and errors, a row a method; as JSON an object with a key a method.
     #[serde(rename = "methods", serialize_with = "by_method")]
     pub rows: Vec<Row>,
@@ -108,6 +112,11 @@ impl LevelError {
         let Self { error, standard_error, texels: places, .. } = *self;
         Estimate { error, standard_error, places }
     }
+}
+
+/// Errors of every level, finest first.
+fn of_levels(estimates: &[Estimate]) -> Vec<LevelError> {
+    estimates.iter().enumerate().map(|(level, e)| LevelError::of(level, e)).collect()
 }
 
 /// Rows as an object with a key a method.
@@ -192,17 +201,25 @@ pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Compari
         .map(|(row, method)| BakedMap { pyramid: &row.pyramid, method: &**method })
         .collect();
     let part = if subject.filtering { 0.5 } else { 1.0 };
-    let levels = level_errors(&truth, &maps, &observer.part(0.0, part))?;
+    let LevelErrors { maps: levels, factoring } = level_errors(&truth, &maps, &observer.part(0.0, part))?;
     // Level 0 is the map itself, filtered as maps have always been.
     let between: Vec<usize> = if subject.filtering { (1..sizes.len()).collect() } else { Vec::new() };
     let wraps = subject.surface.wraps();
     let filtering = filtering_errors(&truth, wraps, &between, &maps, &observer.part(part, 1.0))?;
     for ((row, levels), filtering) in rows.iter_mut().zip(levels).zip(filtering) {
-        row.levels = levels.iter().enumerate().map(|(level, e)| LevelError::of(level, e)).collect();
+        row.levels = of_levels(&levels);
         row.filtering = filtering;
     }
     let (map, brdf) = (subject.name.to_owned(), subject.lobe.to_string());
-    Ok(Comparison { map, width: size.width, height: size.height, brdf, sizes, rows })
+    Ok(Comparison {
+        map,
+        width: size.width,
+        height: size.height,
+        brdf,
+        sizes,
+        factoring: of_levels(&factoring),
+        rows,
+    })
 }
 
 /// A number in six columns, three significant digits where it matters.

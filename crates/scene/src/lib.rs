@@ -143,8 +143,11 @@ impl Scene {
         for material in &mut self.materials {
             material.brdf.lobe = lobe.widen(SlopeVariance::ZERO);
             if let Some(measured) = lobe.measured() {
-                material.params =
-                    SurfaceParams { diffuse: measured.diffuse, specular: DVec3::ONE, ..material.params };
+                material.params = SurfaceParams {
+                    diffuse: measured.factors().diffuse,
+                    specular: DVec3::ONE,
+                    ..material.params
+                };
                 material.textures = None;
                 material.brdf.shading = ShadingModel::Han;
             }

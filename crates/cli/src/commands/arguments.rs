@@ -370,11 +370,14 @@ pub(super) fn read_brdf(spelling: &str) -> Result<AnyLobe, Error> {
         }
         None => spelling.parse::<AnyLobe>().map_err(|e| Error::Request(e.to_string()))?,
     };
-    if let Some(LobeFactors { residual, kernels, .. }) = lobe.measured() {
+    if let Some(measured) = lobe.measured() {
+        let LobeFactors { residual, channels, .. } = measured.factors();
         let [factored, fitted] = [residual.factored, residual.fitted].map(|left| 100.0 * left);
+        let kernels = channels.each_ref().map(|channel| channel.kernels.len());
+        let [red, green, blue] = kernels;
         say(format_args!(
-            "{spelling}: kd + f(theta_h) g(theta_d) leaves {factored:.1} % of the table, and f as {} kernels {fitted:.1} %",
-            kernels.len()
+            "{spelling}: kd + f(theta_h) g(theta_d) leaves {factored:.1} % of the table, and f as {red}, {green} and \
+             {blue} kernels {fitted:.1} %"
         ));
     }
     Ok(lobe)

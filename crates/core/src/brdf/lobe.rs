@@ -14,7 +14,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::beckmann::{self, Beckmann};
-use super::{LobeFactors, Microfacets, mean_of_positive_part};
+use super::{Measured, Microfacets, mean_of_positive_part};
 use crate::sphere::{gauss_legendre, legendre};
 use crate::units::SlopeVariance;
 
@@ -58,8 +58,15 @@ pub trait Lobe: LobeObject + Debug + Display + Send + Sync {
         DVec3::ONE
     }
 
-    /// The factors of a material that was measured as a whole: its diffuse part belongs to the lobe.
-    fn measured(&self) -> Option<&LobeFactors> {
+    /// The lobe widened by a slope variance, in its colours: at the cosine `u = w·n`, and at the cosine
+    /// `wi·wh` of the difference angle.
+    fn colour(&self, by: SlopeVariance, u: f64, difference: f64) -> DVec3 {
+        self.tint(difference) * self.evaluate_widened(by, u)
+    }
+
+    /// The material that was measured as a whole: its diffuse part belongs to the lobe, and channels differ
+    /// by more than a colour.
+    fn measured(&self) -> Option<&Measured> {
         None
     }
 

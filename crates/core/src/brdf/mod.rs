@@ -20,7 +20,7 @@ pub use blinn_phong::BlinnPhong;
 pub use ggx::Ggx;
 pub use lambert::{Lambert, mean_of_positive_part};
 pub use lobe::{AnyLobe, Argument, Lobe, LobeObject, Widen, zonal_by_quadrature};
-pub use measured::{LobeFactors, Measured, PublishedFit};
+pub use measured::{ChannelFactors, LobeFactors, Measured, MeasuredTable, PublishedFit};
 pub use microfacets::Microfacets;
 pub use shading::{Brdf, Directions, LEAST_COSINE, ShadingModel, SurfaceParams};
 pub use table::{ALIASES, ParseLobeError, Row, TABLE};

@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use crate::brdf::{AnyLobe, Argument};
+use crate::brdf::{AnyLobe, Argument, Measured};
 use crate::units::SlopeVariance;
 use crate::words;
 
@@ -91,6 +91,16 @@ impl Directions {
     pub fn between(wi: DVec3, wo: DVec3) -> Option<Self> {
         let wh = (wi + wo).try_normalize()?;
         Some(Self { wi, wo, wh, u: wi.dot(wh) })
+    }
+
+    /// Directions to the light and to the eye in a frame whose z is the unit vector `n`; the light lies over
+    /// x.
+    #[must_use]
+    pub fn about(&self, n: DVec3) -> (DVec3, DVec3) {
+        let (i, o) = (n.dot(self.wi), n.dot(self.wo));
+        let x = (self.wi - i * n).try_normalize().unwrap_or_else(|| n.any_orthonormal_vector());
+        let local = |w: DVec3, cosine: f64| DVec3::new(w.dot(x), w.dot(n.cross(x)), cosine);
+        (local(self.wi, i), local(self.wo, o))
     }
 }
 
@@ -176,12 +186,37 @@ impl Brdf {
         if !self.is_specular() {
             return params.diffuse * (n.dot(directions.wi).max(0.0) / PI);
         }
-        let lobe = self.lobe.evaluate_widened(params.roughness, n.dot(directions.wh));
-        if lobe == 0.0 {
+        let lobe = self.lobe.colour(params.roughness, n.dot(directions.wh), directions.u);
+        if lobe == DVec3::ZERO {
             return diffuse;
         }
-        diffuse
-            + self.lobe.tint(directions.u) * fresnel * (lobe * self.factor(n, directions, params.roughness))
+        diffuse + lobe * fresnel * self.factor(n, directions, params.roughness)
+    }
+
+    /// [`Self::facet`] without what factoring costs: a measured material reflects as it was measured. Where
+    /// roughness widens it, only its lobe knows how.
+    #[must_use]
+    pub fn true_facet(&self, n: DVec3, params: &SurfaceParams, directions: &Directions) -> DVec3 {
+        let itself = |m: &&Measured| m.is_itself() && params.roughness == SlopeVariance::ZERO;
+        let Some(measured) = self.lobe.measured().filter(itself) else {
+            return self.facet(n, params, directions);
+        };
+        let fresnel = self.shading.fresnel(params.specular, directions.u);
+        let diffuse =
+            self.shading.diffuse_share(fresnel) * params.diffuse * (n.dot(directions.wi).max(0.0) / PI);
+        let (wi, wo) = directions.about(n);
+        if wi.z <= 0.0 || wo.z <= 0.0 {
+            return diffuse;
+        }
+        let highlight = measured.reflectance(wi, wo) - measured.factors().diffuse / PI;
+        diffuse + highlight * fresnel * self.factor(n, directions, params.roughness)
+    }
+
+    /// The BRDF of each channel, for a lobe whose channels differ by more than a colour.
+    #[must_use]
+    pub fn channels(&self) -> Option<[Self; 3]> {
+        let measured = self.lobe.measured()?;
+        Some([0, 1, 2].map(|c| Self { lobe: measured.channel(c).into(), shading: self.shading }))
     }
 }
 

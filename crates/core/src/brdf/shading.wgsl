@@ -35,7 +35,7 @@ struct SurfaceParams {
     specular: vec3<f32>,
 }
 
-alias Table = array<vec4<f32>, 3 * TABLE>;
+alias Table = array<vec4<f32>, 3 * TABLE * CHANNELS>;
 
 // A lobe in a shading model: everything about a material that does not change over its surface.
 struct Brdf {
@@ -48,8 +48,8 @@ struct Brdf {
     // Least roughness that `table` is made for, and the span from it to the most.
     roughness: f32,
     span: f32,
-    // The method's numbers for the lobe, entry by entry, three of these each: at eleven roughnesses, and for
-    // the diffuse lobe.
+    // The method's numbers for the lobe, channel by channel, entry by entry, three of these each: at eleven
+    // roughnesses, and for the diffuse lobe.
     table: Table,
 }
 
@@ -58,16 +58,17 @@ struct Brdf {
 // on a sphere, at the rate `decay`. `range` is the least roughness and the span. (The table comes by pointer:
 // copying it for every entry would take most of the time.)
 fn tabulated(table: ptr<function, Table>, range: vec2<f32>, entry: u32, roughness: f32, decay: f32) -> f32 {
+    let first = 3u * (shaded_channel() * TABLE + entry);
     if range.y <= 0.0 {
-        return (*table)[3u * entry].x;
+        return (*table)[first].x;
     }
     let t = 10.0 * sqrt(clamp((roughness - range.x) / range.y, 0.0, 1.0));
     let k = min(u32(t), 9u);
     let i = k + 1u;
     let at = range.x + range.y * vec2<f32>(f32(k * k), f32(i * i)) / 100.0;
     let carried = exp(decay * (at - roughness));
-    let below = (*table)[3u * entry + k / 4u][k % 4u] * carried.x;
-    let above = (*table)[3u * entry + i / 4u][i % 4u] * carried.y;
+    let below = (*table)[first + k / 4u][k % 4u] * carried.x;
+    let above = (*table)[first + i / 4u][i % 4u] * carried.y;
     return mix(below, above, t - f32(k));
 }
 
@@ -139,6 +140,13 @@ fn facet(brdf: Brdf, n: vec3<f32>, params: SurfaceParams, directions: Directions
     }
     let f = fresnel(brdf.shading, params.specular, directions.u);
     let diffuse = diffuse_share(brdf.shading, f) * lambert;
-    let lobe = lobe_evaluate(lobe_widen(brdf.base, params.roughness), dot(n, directions.wh));
-    return diffuse + lobe_tint(directions.u) * f * (lobe * factor(brdf, n, directions, params.roughness));
+    let base = lobe_widen(brdf.base, params.roughness);
+    let u = dot(n, directions.wh);
+    var lobe = lobe_tint(directions.u) * lobe_evaluate(base, u);
+    for (var c = 1u; c < CHANNELS; c++) {
+        turn_to_channel(c);
+        lobe[c] = lobe_tint(directions.u).x * lobe_evaluate(base, u);
+    }
+    turn_to_channel(0u);
+    return diffuse + lobe * f * factor(brdf, n, directions, params.roughness);
 }

@@ -79,6 +79,8 @@ pub struct SplitSum {
     pub microfacets: Microfacets,
     /// Facets of the lobe, per unit of map: the integral of its profile over slopes.
     pub facets: f64,
+    /// Tables of each channel, for a lobe whose channels differ by more than a colour.
+    channels: Option<Box<[SplitSum; 3]>>,
 }
 
 impl SplitSum {
@@ -96,7 +98,14 @@ impl SplitSum {
             zonal: std::array::from_fn(|l| coefficients[l]),
             microfacets: brdf.lobe.microfacets(),
             facets: facets(&*brdf.lobe),
+            channels: brdf.channels().map(|channels| Box::new(channels.each_ref().map(Self::new))),
         }
+    }
+
+    /// The table of one channel, 0 to 2: the same in all for most lobes.
+    #[must_use]
+    pub fn channel(&self, channel: usize) -> &Self {
+        self.channels.as_ref().map_or(self, |channels| &channels[channel])
     }
 
     /// Light that normals of this spread reflect to an eye at this cosine to their mean.
@@ -113,9 +122,13 @@ impl SplitSum {
     }
 
     /// The table as shaders take it, two texels an entry: scale and bias; lobe, rise, tilt and blur. One row
-    /// more holds the zonal coefficients from the left, and in its first texel, second, the facets.
+    /// more holds the zonal coefficients from the left, and in its first texel, second, the facets. Channels
+    /// that have tables of their own follow each other.
     #[must_use]
     pub fn texels(&self) -> Vec<[f32; 4]> {
+        if let Some(channels) = &self.channels {
+            return channels.iter().flat_map(Self::texels).collect();
+        }
         let of = |e: &Reflected| {
             let [r, g, b] = e.scale.to_array();
             [[r, g, b, e.bias], [e.lobe, e.rise, e.tilt, e.blur]].map(|texel| texel.map(|v| v as f32))

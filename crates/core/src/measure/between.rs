@@ -138,8 +138,8 @@ impl Corners<'_> {
     /// Sums of squares of a map: for each figure, of every corner.
     fn squares(&self, truth: &TexelTruth<'_>, map: &BakedMap<'_>) -> [Vec<Squares>; FIGURES] {
         let BakedMap { pyramid, method } = map;
-        let evaluator = method.evaluator(truth.lobe, &truth.lattice.directions);
-        let directions = truth.lattice.len();
+        let evaluator = truth.shown_by(*method);
+        let directions = truth.values();
         let of_corner = |(corner, lobes): (&Corner, &[Vec<f64>; 4])| {
             let mut sums = [Squares::default(); FIGURES];
             let mut out = vec![0.0; directions];
@@ -156,7 +156,7 @@ impl Corners<'_> {
                 let (x, y) = corner[0];
                 let size = DVec2::new(self.size.width as f64, self.size.height as f64);
                 let uv = (DVec2::new(x as f64, y as f64) + place) / size;
-                evaluate_neighbours(pyramid, &*evaluator, (uv, self.level as f64), &mut out);
+                evaluate_neighbours(pyramid, &evaluator, (uv, self.level as f64), &mut out);
                 sums[2].add(&out, &lobe);
                 if method.filterable() {
                     channels.fill(0.0);

@@ -10,10 +10,11 @@ use std::ops::RangeInclusive;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::aspect::{AspectEvaluator, Aspects, Reflectance};
 use super::estimate::{Draws, Estimate, Sampled, Squares};
 use crate::brdf::Lobe;
 use crate::grid::Size;
-use crate::ndf::Method;
+use crate::ndf::{Evaluator, Method};
 use crate::observe::{Cancelled, Observer};
 use crate::pyramid::{Pyramid, footprint, level_sizes};
 use crate::sphere::DiskLattice;
@@ -68,8 +69,8 @@ pub fn lattice_for(lobe: &dyn Lobe) -> Result<DiskLattice, TooNarrow> {
 pub struct TexelTruth<'a> {
     size: Size,
     normals: Vec<[f32; 3]>,
-    pub(super) lobe: &'a dyn Lobe,
-    pub(super) lattice: &'a DiskLattice,
+    aspects: Aspects<'a>,
+    lattice: &'a DiskLattice,
     /// Half-angle beyond which the lobe is below 1e-12 of its peak.
     reach: f64,
 }
@@ -85,7 +86,9 @@ impl<'a> TexelTruth<'a> {
             surface.read_row(y, &mut row);
             normals.extend((0..size.width).map(|i| row.normal(i).to_array()));
         }
-        Self { size, normals, lobe, lattice, reach: reach(lobe) }
+        let aspects = Aspects::new(lobe);
+        let reach = aspects.reach();
+        Self { size, normals, aspects, lattice, reach }
     }
 
     /// Size of the finest level.
@@ -94,8 +97,26 @@ impl<'a> TexelTruth<'a> {
         self.size
     }
 
-    /// Adds `weight f(w · n)` for every direction that the lobe around `n` reaches.
-    fn splat(&self, n: DVec3, weight: f64, scratch: &mut [f64], out: &mut [f64]) {
+    /// True where the lobe stands for a measured material, which it does not equal.
+    #[must_use]
+    pub fn is_measured(&self) -> bool {
+        self.aspects.count() > 1
+    }
+
+    /// Number of values of a texel: directions, once for each aspect of the material. A lobe has one; a
+    /// measured material has three channels at three difference angles.
+    #[must_use]
+    pub fn values(&self) -> usize {
+        self.aspects.count() * self.lattice.len()
+    }
+
+    /// An evaluator of what a method shows in the place of [`Self::texel`].
+    pub fn shown_by<'b>(&'b self, method: &'b dyn Method) -> impl Evaluator + 'b {
+        AspectEvaluator::new(&self.aspects, method, &self.lattice.directions)
+    }
+
+    /// Adds `weight f(w · n)` for every direction that the lobe around `n` reaches, in every aspect.
+    fn splat(&self, (n, weight): (DVec3, f64), by: Reflectance, scratch: &mut [f64], out: &mut [f64]) {
         // The cap of half-angle r around n spans cos r n.x ± sin r sqrt(1 - n.x²) in x, likewise in y.
         let (sin, cos) = self.reach.sin_cos();
         let span = |c: f64| {
@@ -120,42 +141,36 @@ impl<'a> TexelTruth<'a> {
             for (u, w) in scratch.iter_mut().zip(&row[first..last]) {
                 *u = w.dot(n);
             }
-            self.lobe.evaluate_all(scratch);
-            for (out, f) in out[range.start + first..].iter_mut().zip(scratch.iter()) {
-                *out += weight * f;
-            }
+            self.aspects.add(by, scratch, weight, (out, range.start + first, self.lattice.len()));
         }
     }
 
-    /// The true effective lobe of texel `(x, y)` of a level of this size, at every direction.
+    /// The true effective lobe of texel `(x, y)` of a level of this size: at every direction, aspect after
+    /// aspect, [`Self::values`] in all.
     #[must_use]
     pub fn texel(&self, level: Size, x: usize, y: usize) -> Vec<f64> {
-        let mut out = vec![0.0; self.lattice.len()];
+        self.mean_of_normals(level, (x, y), Reflectance::True)
+    }
+
+    /// That lobe, by the factors of a measured material in its place: what factoring alone costs.
+    #[must_use]
+    pub fn factored_texel(&self, level: Size, x: usize, y: usize) -> Vec<f64> {
+        self.mean_of_normals(level, (x, y), Reflectance::Factored)
+    }
+
+    fn mean_of_normals(&self, level: Size, (x, y): (usize, usize), by: Reflectance) -> Vec<f64> {
+        let mut out = vec![0.0; self.values()];
         let mut scratch = vec![0.0; self.lattice.len()];
         let (rows, row_weight) = footprint(self.size.height, level.height, y);
         for j in rows {
             let (columns, weight) = footprint(self.size.width, level.width, x);
             for i in columns {
                 let n = DVec3::from_array(self.normals[j * self.size.width + i].map(f64::from));
-                self.splat(n, row_weight(j) * weight(i), &mut scratch, &mut out);
+                self.splat((n, row_weight(j) * weight(i)), by, &mut scratch, &mut out);
             }
         }
         out
     }
-}
-
-/// Angle beyond which a falling lobe stays below 1e-12 of its peak.
-fn reach(lobe: &dyn Lobe) -> f64 {
-    let peak = lobe.evaluate(1.0);
-    let (mut near, mut far) = (0.0, std::f64::consts::FRAC_PI_2);
-    if lobe.evaluate(1e-3) > 1e-12 * peak {
-        return far;
-    }
-    for _ in 0..60 {
-        let middle = (near + far) / 2.0;
-        if lobe.evaluate(f64::cos(middle)) > 1e-12 * peak { near = middle } else { far = middle }
-    }
-    far
 }
 
 /// All texels of one level and their true lobes.
@@ -238,6 +253,16 @@ impl TexelTruth<'_> {
     }
 }
 
+/// Errors of every level, finest first.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LevelErrors {
+    /// Errors of each map.
+    pub maps: Vec<Vec<Estimate>>,
+    /// Share of a measured material's factors in them: the error of the normals as they are, shaded by the
+    /// factors. Empty for other lobes.
+    pub factoring: Vec<Estimate>,
+}
+
 /// Errors of maps of one surface at every level, map by map; each map is measured at the same texels.
 ///
 /// A level of at most [`MAX_TEXELS`] texels is measured whole. Of others texels are drawn, more of them where
@@ -250,13 +275,15 @@ pub fn level_errors(
     truth: &TexelTruth<'_>,
     maps: &[BakedMap<'_>],
     observer: &dyn Observer,
-) -> Result<Vec<Vec<Estimate>>, Cancelled> {
+) -> Result<LevelErrors, Cancelled> {
     let sizes = level_sizes(truth.size);
-    let mut errors = vec![Vec::with_capacity(sizes.len()); maps.len()];
+    let figures = maps.len() + usize::from(truth.is_measured());
+    let mut errors = vec![Vec::with_capacity(sizes.len()); figures];
     let mut finer: Option<TrueLevel> = None;
     for (level, size) in sizes.iter().enumerate() {
-        let mut drawn = Sampled::new(maps.len());
-        if size.area() > MAX_TEXELS {
+        let mut drawn = Sampled::new(figures);
+        // All lobes of a level are kept: of as many aspects, fewer.
+        if size.area() > MAX_TEXELS / truth.aspects.count() {
             let draws = truth.draws(*size);
             while !drawn.is_enough(MOST_SAMPLED.min(size.area())) {
                 let places = draws.draw(SAMPLED_TEXELS, level, drawn.batches);
@@ -266,14 +293,14 @@ pub fn level_errors(
         }
         let estimates = if drawn.batches == 0 {
             let whole = truth.level(level, finer.as_ref(), observer)?;
-            let of_map = |map| squares(truth, map, level, &whole.texels, &whole.lobes);
-            let own = maps.iter().map(|map| Estimate::of(&of_map(map), None)).collect();
+            let squares = all_squares(truth, maps, (level, &whole.texels), &whole.lobes);
+            let own = squares.iter().map(|squares| Estimate::of(squares, None)).collect();
             // Coarser ones are averaged from it where they nest in it.
             finer = Some(whole);
             own
         } else if drawn.weights.len() >= size.area() {
             // In parts: all lobes of a large level at once are gigabytes.
-            let mut whole = vec![Vec::new(); maps.len()];
+            let mut whole = vec![Vec::new(); figures];
             for texels in all_texels(*size).chunks(SAMPLED_TEXELS) {
                 let own = measured(truth, maps, level, texels, observer)?;
                 whole.iter_mut().zip(own).for_each(|(all, own)| all.extend(own));
@@ -285,10 +312,11 @@ pub fn level_errors(
         errors.iter_mut().zip(estimates).for_each(|(errors, estimate)| errors.push(estimate));
         observer.progress((level + 1) as f64 / sizes.len() as f64);
     }
-    Ok(errors)
+    let factoring = if truth.is_measured() { errors.pop().unwrap_or_default() } else { Vec::new() };
+    Ok(LevelErrors { maps: errors, factoring })
 }
 
-/// Sums of squares of some texels of a level, map by map.
+/// Sums of squares of some texels of a level, map by map, and last of a measured material's factors.
 fn measured(
     truth: &TexelTruth<'_>,
     maps: &[BakedMap<'_>],
@@ -297,7 +325,27 @@ fn measured(
     observer: &dyn Observer,
 ) -> Result<Vec<Vec<Squares>>, Cancelled> {
     let lobes = truth.texels(level_sizes(truth.size)[level], texels, observer)?;
-    Ok(maps.iter().map(|map| squares(truth, map, level, texels, &lobes)).collect())
+    Ok(all_squares(truth, maps, (level, texels), &lobes))
+}
+
+/// [`measured`], with the true lobes at hand.
+fn all_squares(
+    truth: &TexelTruth<'_>,
+    maps: &[BakedMap<'_>],
+    (level, texels): (usize, &[(usize, usize)]),
+    lobes: &[Vec<f64>],
+) -> Vec<Vec<Squares>> {
+    let mut all: Vec<_> = maps.iter().map(|map| squares(truth, map, level, texels, lobes)).collect();
+    if truth.is_measured() {
+        let size = level_sizes(truth.size)[level];
+        let of = |((x, y), lobe): (&(usize, usize), &Vec<f64>)| {
+            let mut sums = Squares::default();
+            sums.add(&truth.factored_texel(size, *x, *y), lobe);
+            sums
+        };
+        all.push(texels.par_iter().zip(lobes).map(of).collect());
+    }
+    all
 }
 
 /// Sums of squares of a map's texels against their true lobes.
@@ -308,7 +356,7 @@ fn squares(
     texels: &[(usize, usize)],
     lobes: &[Vec<f64>],
 ) -> Vec<Squares> {
-    let evaluator = map.method.evaluator(truth.lobe, &truth.lattice.directions);
+    let evaluator = truth.shown_by(map.method);
     let of = |((x, y), lobe): (&(usize, usize), &Vec<f64>)| {
         let mut approx = vec![0.0; lobe.len()];
         evaluator.evaluate(&map.pyramid.texel(level, *x, *y), &mut approx);
@@ -373,7 +421,7 @@ mod tests {
         let pyramid = crate::bake::Bake::new(&flat, &*method).to_pyramid().unwrap().0;
         let truth = TexelTruth::new(&flat, &*lobe, &lattice);
         let maps = [BakedMap { pyramid: &pyramid, method: &*method }];
-        for estimate in &level_errors(&truth, &maps, &|_| ()).unwrap()[0] {
+        for estimate in &level_errors(&truth, &maps, &|_| ()).unwrap().maps[0] {
             assert!(estimate.error < 1e-6 && estimate.standard_error == 0.0, "{estimate:?}");
         }
     }

@@ -288,18 +288,26 @@ impl<R: Representation> Method for R {
     fn prepare(&self, brdf: &Brdf, roughness: SlopeVariance) -> PreparedBrdf {
         let lobe = brdf.lobe.widen(roughness);
         let (table, diffuse_table) = (self.table(&*lobe), self.table(&Lambert::SHARP));
-        PreparedBrdf { brdf: brdf.clone(), roughness, lobe, table, diffuse_table }
+        let channels = brdf.channels();
+        let channels = channels.map(|own| Box::new(own.each_ref().map(|brdf| self.prepare(brdf, roughness))));
+        PreparedBrdf { brdf: brdf.clone(), roughness, lobe, table, diffuse_table, channels }
     }
 
     fn reflect(&self, texel: &FilteredTexel<'_>, lights: &[IncidentLight]) -> DVec3 {
-        reflect::reflect(self, texel, lights)
+        texel.by_channels(|texel, _| reflect::reflect(self, texel, lights))
     }
 
     fn reflect_environment(&self, texel: &FilteredTexel<'_>, local: &LocalEnvironment<'_>) -> DVec3 {
-        environment::reflect(self, texel, local)
+        texel.by_channels(|texel, channel| {
+            let split_sum = local.split_sum.channel(channel);
+            environment::reflect(self, texel, &LocalEnvironment { split_sum, ..*local })
+        })
     }
 
     fn shader_table(&self, brdf: &Brdf, least: SlopeVariance, most: SlopeVariance) -> LobeTable {
+        if let Some(channels) = brdf.channels() {
+            return LobeTable::concat(&channels.each_ref().map(|brdf| self.shader_table(brdf, least, most)));
+        }
         let mut table = LobeTable::new(self.shader().entries());
         let span = most.get() - least.get();
         for k in 0..TABLE_ROUGHNESSES {

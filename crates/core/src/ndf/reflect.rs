@@ -34,6 +34,8 @@ pub struct PreparedBrdf {
     pub(super) table: Vec<f64>,
     /// The method's numbers for the diffuse lobe.
     pub(super) diffuse_table: Vec<f64>,
+    /// All that of each channel, for a lobe whose channels differ by more than a colour.
+    pub(super) channels: Option<Box<[PreparedBrdf; 3]>>,
 }
 
 impl PreparedBrdf {
@@ -58,6 +60,20 @@ pub struct FilteredTexel<'a> {
     pub at_means: bool,
     /// For a displaced surface, how slopes of the map lie on it; `None` for a normal map.
     pub slope_map: Option<DMat2>,
+}
+
+impl FilteredTexel<'_> {
+    /// Light of the texel by a function, which is asked once a channel, with its number, where a lobe's
+    /// channels differ by more than a colour.
+    pub(super) fn by_channels(&self, light: impl Fn(&FilteredTexel<'_>, usize) -> DVec3) -> DVec3 {
+        match &self.prepared.channels {
+            None => light(self, 0),
+            Some(channels) => {
+                let of = |c: usize| light(&FilteredTexel { prepared: &channels[c], ..*self }, c)[c];
+                DVec3::new(of(0), of(1), of(2))
+            }
+        }
+    }
 }
 
 /// Light that a filtered texel sends to the eye.
@@ -87,7 +103,7 @@ fn of_whole<R: Representation>(
     lights: &[IncidentLight],
 ) -> DVec3 {
     let params = (texel.params)(None);
-    let PreparedBrdf { brdf, roughness, lobe, table, diffuse_table } = texel.prepared;
+    let PreparedBrdf { brdf, roughness, lobe, table, diffuse_table, .. } = texel.prepared;
     // Where a roughness map differs from the roughness prepared for, the lobe is made anew.
     let own = (params.roughness != *roughness).then(|| brdf.lobe.widen(params.roughness));
     let lobe = match &own {

@@ -38,6 +38,24 @@ fn combine(brdf: Brdf, params: SurfaceParams, directions: Directions, specular: 
     return lobe_tint(directions.u) * f * max(specular, 0.0) + diffuse_share(brdf.shading, f) * lambert;
 }
 
+// Light that a texel sends along the path, per unit of irradiance: `reflect_texel`, for a lobe whose channels
+// differ by more than a colour once a channel.
+fn reflect_channels(
+    channels: ptr<function, Channels>,
+    decoded: ptr<function, Decoded>,
+    plain: SurfaceParams,
+    brdf: Brdf,
+    directions: Directions,
+) -> vec3<f32> {
+    var light = reflect_texel(channels, decoded, plain, brdf, directions);
+    for (var c = 1u; c < CHANNELS; c++) {
+        turn_to_channel(c);
+        light[c] = reflect_texel(channels, decoded, plain, brdf, directions)[c];
+    }
+    turn_to_channel(0u);
+    return light;
+}
+
 // Surface parameters of a lobe: those it carries, or `plain` where lobes carry none.
 fn params_of(channels: ptr<function, Channels>, lobe: u32, plain: SurfaceParams) -> SurfaceParams {
     var params = plain;

@@ -21,5 +21,5 @@ fn ndf_shade_channels(channels: ptr<function, Channels>, place: NdfPlace) -> vec
     }
     var decoded = decode(channels);
     let params = SurfaceParams(place.diffuse, 0.0, place.specular);
-    return reflect_texel(channels, &decoded, params, ndf_brdf(), directions_between(place.wi, place.wo));
+    return reflect_channels(channels, &decoded, params, ndf_brdf(), directions_between(place.wi, place.wo));
 }

@@ -29,6 +29,9 @@ pub struct Language {
     pub summary: &'static str,
     /// Call of the library; `None` for a language without text to include, and so without a library.
     call: Option<&'static str>,
+    /// True for a language without variables at module scope: functions that need one take it as their last
+    /// argument.
+    passes_variables: bool,
     /// True for a language whose text is handed out as it is; naga writes the others, and wants an entry
     /// point.
     own_text: bool,
@@ -42,6 +45,10 @@ const WITH_SAMPLER: &str = "ndf_shade(map, map_sampler, uv, place)";
 /// Call in languages whose samplers are textures too.
 const COMBINED: &str = "ndf_shade(map, uv, place)";
 
+/// Sentence about a measured lobe in a language without variables at module scope.
+const OWN_VARIABLE: &str = "\n\nThe last argument, after the place, is a `thread uint` of the caller's own that is 0: the functions count \
+                            channels in it.";
+
 /// Every language.
 pub static TABLE: &[Language] = &[
     Language {
@@ -49,6 +56,7 @@ pub static TABLE: &[Language] = &[
         aliases: &["webgpu"],
         summary: "WebGPU Shading Language: our own text, with its comments",
         call: Some(WITH_SAMPLER),
+        passes_variables: false,
         own_text: true,
         write: |linked| Ok(prefixed(&linked.text, &foreign(&linked.module)).into_bytes()),
     },
@@ -57,6 +65,7 @@ pub static TABLE: &[Language] = &[
         aliases: &["opengl", "vulkan-glsl"],
         summary: "GLSL 4.50, to be included after `#version`",
         call: Some(COMBINED),
+        passes_variables: false,
         own_text: false,
         write: |linked| glsl(linked, back::glsl::Version::Desktop(450), ""),
     },
@@ -65,6 +74,7 @@ pub static TABLE: &[Language] = &[
         aliases: &["webgl", "essl"],
         summary: "GLSL ES 3.00 (WebGL 2), to be included after `#version`",
         call: Some(COMBINED),
+        passes_variables: false,
         own_text: false,
         write: |linked| glsl(linked, back::glsl::Version::new_gles(300), ES_PRECISION),
     },
@@ -73,6 +83,7 @@ pub static TABLE: &[Language] = &[
         aliases: &["directx", "d3d"],
         summary: "HLSL, shader model 5.1 and up",
         call: Some(WITH_SAMPLER),
+        passes_variables: false,
         own_text: false,
         write: hlsl,
     },
@@ -81,6 +92,7 @@ pub static TABLE: &[Language] = &[
         aliases: &["metal"],
         summary: "Metal Shading Language 2.4",
         call: Some(WITH_SAMPLER),
+        passes_variables: true,
         own_text: false,
         write: msl,
     },
@@ -89,6 +101,7 @@ pub static TABLE: &[Language] = &[
         aliases: &["spir-v", "spv", "vulkan"],
         summary: "SPIR-V 1.3: a fragment shader `main`, map and sampler at set 0, bindings 0 and 1",
         call: None,
+        passes_variables: false,
         own_text: false,
         write: spirv,
     },
@@ -115,7 +128,8 @@ impl Export<'_> {
         let body = (language.write)(&linked)
             .map_err(|e| GpuError::Shader(format!("{} cannot say it: {e}", language.name)))?;
         let Some(call) = language.call else { return Ok(body) };
-        let head: String = self.head(call).lines().fold(String::new(), |mut head, line| {
+        let own = language.passes_variables && self.brdf.lobe.measured().is_some();
+        let head: String = self.head(call, own).lines().fold(String::new(), |mut head, line| {
             // Writing to a string cannot fail.
             let _ = writeln!(head, "{}", format!("// {line}").trim_end());
             head
@@ -153,7 +167,7 @@ impl Export<'_> {
     }
 
     /// Text at the head of the file.
-    fn head(&self, call: &str) -> String {
+    fn head(&self, call: &str, own_variable: bool) -> String {
         let sampler = if self.method.filterable() {
             "a sampler that filters linearly on all three axes"
         } else {
@@ -169,8 +183,9 @@ impl Export<'_> {
              \n    {call}\n\n\
              with uv from 0 to 1 over the map, v down its rows, and a place in the tangent frame (x along u, y against v, z out):\n\
              unit vectors to light and eye, albedo, reflectance at normal incidence. It returns the radiance to the eye, for each\n\
-             unit of the light's irradiance on a plane that faces it. Call it once a light, and add.",
-            env!("CARGO_PKG_VERSION")
+             unit of the light's irradiance on a plane that faces it. Call it once a light, and add.{}",
+            env!("CARGO_PKG_VERSION"),
+            if own_variable { OWN_VARIABLE } else { "" }
         )
     }
 }
@@ -188,6 +203,7 @@ fn private(linked: &Linked) -> Result<(naga::Module, naga::valid::ModuleInfo), S
     };
     module.functions.iter_mut().for_each(|(_, function)| own(&mut function.name));
     module.constants.iter_mut().for_each(|(_, constant)| own(&mut constant.name));
+    module.global_variables.iter_mut().for_each(|(_, global)| own(&mut global.name));
     let types: Vec<_> = module.types.iter().map(|(handle, ty)| (handle, ty.clone())).collect();
     for (handle, mut ty) in types {
         let before = ty.name.clone();
@@ -208,8 +224,17 @@ fn private(linked: &Linked) -> Result<(naga::Module, naga::valid::ModuleInfo), S
 fn library(linked: &Linked) -> Result<(naga::Module, naga::valid::ModuleInfo), String> {
     let (mut module, _) = private(linked)?;
     module.entry_points.clear();
-    // Nothing but the entry point refers to bindings.
-    module.global_variables = naga::Arena::new();
+    // Nothing but the entry point refers to bindings, which are declared with it, last.
+    let mut kept = naga::Arena::new();
+    for (handle, global) in module.global_variables.iter() {
+        if global.space == naga::AddressSpace::Private {
+            let same = kept.append(global.clone(), module.global_variables.get_span(handle)) == handle;
+            if !same {
+                return Err("a private variable is declared after a binding".to_owned());
+            }
+        }
+    }
+    module.global_variables = kept;
     let flags = naga::valid::ValidationFlags::all();
     let info = naga::valid::Validator::new(flags, naga::valid::Capabilities::default())
         .validate(&module)

@@ -10,7 +10,8 @@ pub(super) fn foreign(module: &naga::Module) -> HashSet<String> {
     let functions = module.functions.iter().filter_map(|(_, function)| function.name.clone());
     let constants = module.constants.iter().filter_map(|(_, constant)| constant.name.clone());
     let types = module.types.iter().filter_map(|(_, ty)| ty.name.clone());
-    functions.chain(constants).chain(types).filter(|name| !is_own(name)).collect()
+    let globals = module.global_variables.iter().filter_map(|(_, global)| global.name.clone());
+    functions.chain(constants).chain(types).chain(globals).filter(|name| !is_own(name)).collect()
 }
 
 /// True for a name that begins with the library's prefix, as a type's does too: `NdfPlace`.

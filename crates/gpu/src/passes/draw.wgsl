@@ -20,6 +20,17 @@ fn material_params(diffuse_roughness: vec4<f32>, specular: vec4<f32>) -> Surface
 
 // Radiance of a texel under all lights.
 fn shade(place: Place, channels: ptr<function, Channels>, plain: SurfaceParams) -> vec3<f32> {
+    var light = shade_channel(place, channels, plain);
+    for (var c = 1u; c < CHANNELS; c++) {
+        turn_to_channel(c);
+        light[c] = shade_channel(place, channels, plain)[c];
+    }
+    turn_to_channel(0u);
+    return light;
+}
+
+// That radiance; of a lobe whose channels differ by more than a colour, right in the one that is shaded.
+fn shade_channel(place: Place, channels: ptr<function, Channels>, plain: SurfaceParams) -> vec3<f32> {
     var decoded = decode(channels);
     var sum = vec3<f32>(0.0);
     // A displaced facet may face lights and eyes that its base turns its back on.

@@ -22,5 +22,5 @@ fn half_vector_coefficient(view: u32, i: u32) -> vec3<f32> {
 }
 
 fn split_sum_texel(x: u32, y: u32) -> vec4<f32> {
-    return textureLoad(split_sums, vec2<u32>(x, y), 0);
+    return textureLoad(split_sums, vec2<u32>(x, y + shaded_channel() * (SPLIT_SUM_ENTRIES + 1u)), 0);
 }

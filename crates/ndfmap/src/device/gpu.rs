@@ -68,8 +68,10 @@ impl Engine for Gpu {
         effort: &Effort,
         observer: &dyn Observer,
     ) -> Result<TruePicture, Error> {
-        if view.scene.is_displaced() || view.scene.environment.is_some() {
-            // Displaced facets, and light that is drawn by chance, need rays.
+        let measured = view.scene.materials.iter().any(|m| m.brdf.lobe.measured().is_some());
+        if view.scene.is_displaced() || view.scene.environment.is_some() || measured {
+            // Displaced facets, and light that is drawn by chance, need rays; and shaders know a measured
+            // material by its factors alone.
             let geometry = TrueGeometry::new(view.scene, observer);
             return Ok(geometry.truth(view.scene).render(&view.camera, view.size, effort, observer)?);
         }

@@ -1,6 +1,7 @@
 //! The contact sheet: the map under one light at growing distances, the truth beside every method.
 
 use glam::DVec3;
+use ndfmap_core::brdf::AnyLobe;
 use ndfmap_core::grid::Size;
 use ndfmap_core::measure::TexelTruth;
 use ndfmap_core::sphere::DiskLattice;
@@ -73,7 +74,10 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Canvas {
 fn columns(subject: &Subject<'_>, comparison: &Comparison, shown: &[(usize, Size)]) -> Vec<Column> {
     let w = direction();
     let lattice = DiskLattice { directions: vec![w], rows: vec![(w.y, 0..1)] };
-    let truth = TexelTruth::new(subject.surface, subject.lobe, &lattice);
+    // Of a measured material, its green lobe.
+    let green = subject.lobe.measured().map(|measured| AnyLobe::from(measured.channel(1)));
+    let lobe = green.as_deref().unwrap_or(subject.lobe);
+    let truth = TexelTruth::new(subject.surface, lobe, &lattice);
     let texels = |size: Size| (0..size.area()).into_par_iter().map(move |i| (i % size.width, i / size.width));
     let true_levels = shown
         .iter()
@@ -86,7 +90,7 @@ fn columns(subject: &Subject<'_>, comparison: &Comparison, shown: &[(usize, Size
     }];
     for row in &comparison.rows {
         let Ok(method) = row.method.parse::<AnyMethod>() else { continue };
-        let evaluator = method.evaluator(subject.lobe, &lattice.directions);
+        let evaluator = method.evaluator(lobe, &lattice.directions);
         let value = |level: usize, x: usize, y: usize| {
             let mut out = [0.0];
             evaluator.evaluate(&row.pyramid.texel(level, x, y), &mut out);

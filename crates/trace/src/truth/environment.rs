@@ -104,7 +104,7 @@ impl<'a> SampledEnvironment<'a> {
             if density <= 0.0 {
                 continue;
             }
-            let reflected = shown.brdf.facet(shown.n, shown.params, &directions);
+            let reflected = shown.brdf.true_facet(shown.n, shown.params, &directions);
             if reflected != DVec3::ZERO && open(wi) {
                 sum += self.map.radiance(towards) * reflected / density;
             }

@@ -264,7 +264,7 @@ impl<'a> Truth<'a> {
             {
                 return DVec3::ZERO;
             }
-            irradiance * brdf.facet(DVec3::Z, &params, &directions)
+            irradiance * brdf.true_facet(DVec3::Z, &params, &directions)
         };
         let direct: DVec3 = self.scene.lights.iter().map(of).sum();
         let shown = LitFacet { frame, wo, n: DVec3::Z, params: &params, brdf };
@@ -309,7 +309,7 @@ impl<'a> Truth<'a> {
         let brdf = &material.brdf;
         let direct: DVec3 =
             incident_directions(&self.scene.lights, (place.position, place.frame), wo, Directions::new)
-                .map(|(directions, irradiance)| irradiance * brdf.facet(n, &params, &directions))
+                .map(|(directions, irradiance)| irradiance * brdf.true_facet(n, &params, &directions))
                 .sum();
         let shown = LitFacet { frame: place.frame, wo, n, params: &params, brdf };
         direct

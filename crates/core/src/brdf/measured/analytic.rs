@@ -12,6 +12,7 @@ const SGD: &str = include_str!("merl_sgd_fits.csv");
 const ABC: &str = include_str!("merl_abc_fits.csv");
 
 /// A material's numbers, as they stand in its row.
+#[derive(Debug)]
 pub(super) enum Material {
     Sgd(Vec<f64>),
     Abc(Vec<f64>),

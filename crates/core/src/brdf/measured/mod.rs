@@ -1,4 +1,4 @@
-//! Measured lobes: `kd + f(theta_h) g(theta_d)`, f a sum of kernels that widen in closed form, g a colour.
+//! Measured lobes: `kd + f(theta_h) g(theta_d)` in each channel, f a sum of kernels that widen in closed form.
 //!
 //! Han et al. 2007, section 4, take measured materials in the factored form of Lawrence et al. 2006: f is a
 //! lobe around the half-vector, and g does not depend on the normal. The factors are fitted to a table of
@@ -6,13 +6,18 @@
 //! the error that this leaves. f is stored as a sum of von Mises-Fisher kernels, none of negative weight:
 //! convolving with a lobe of normals adds its variance to each kernel's, which is what the paper's zonal
 //! series `Σ Lambda_l rho_l Y_l0` does order by order, without its hundreds of orders for a shiny material
-//! (`docs/decisions.md`). With Han et al.'s factor `max(n·wi, 0)` the lobe is the measured reflectance
-//! itself.
+//! (`docs/decisions.md`). With Han et al.'s factor `max(n·wi, 0)` the lobe is the measured reflectance,
+//! but for that error. Truths do not have it: they ask for [`Measured::reflectance`], the material itself.
+//!
+//! Each channel has an f of its own. What shades a texel does so channel by channel ([`Measured::channel`]).
 
 mod analytic;
 mod factor;
+mod kernels;
+mod table;
 
-pub use factor::{BINS, Residual, half_angle};
+pub use factor::Residual;
+pub use table::{BINS, MeasuredTable, half_angle};
 
 use std::borrow::Cow;
 use std::f64::consts::PI;
@@ -24,15 +29,32 @@ use glam::DVec3;
 use super::{AnyLobe, Lobe, Microfacets, Row, Widen, twin};
 use crate::units::SlopeVariance;
 use crate::words;
+use kernels::kernel;
 
 /// A measured lobe.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Measured {
     /// Name, as on the command line.
     name: String,
-    fit: Arc<LobeFactors>,
+    material: Arc<Material>,
+    /// The one channel that it shows; `None` for the material as a whole.
+    channel: Option<usize>,
     /// Slope variance that widened it.
     widened: SlopeVariance,
+}
+
+/// Material behind a lobe.
+#[derive(Debug)]
+struct Material {
+    source: Source,
+    factors: LobeFactors,
+}
+
+/// Origin of a material's reflectance.
+#[derive(Debug)]
+enum Source {
+    Published(analytic::Material),
+    Table(MeasuredTable),
 }
 
 /// The factors of a material.
@@ -40,13 +62,53 @@ pub struct Measured {
 pub struct LobeFactors {
     /// Diffuse albedo, linear RGB: pi times the constant part.
     pub diffuse: DVec3,
+    /// f and g of red, green and blue.
+    pub channels: [ChannelFactors; 3],
+    /// Error that the fit leaves.
+    pub residual: Residual,
+}
+
+/// Turns of the difference that tell apart all that published fits depend on.
+const TURNS: u32 = 16;
+
+/// Coefficients of g's polynomial.
+pub const TINT: usize = 8;
+
+/// The factors of a channel.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ChannelFactors {
     /// Kernels of f: weight, and variance on one axis.
     pub kernels: Vec<(f64, f64)>,
     /// `g cos² theta_d` as a polynomial in `1 - cos theta_d`, from the constant up; below zero it counts as
     /// zero.
-    pub tint: [DVec3; 6],
-    /// Error that the fit leaves.
-    pub residual: Residual,
+    pub tint: [f64; TINT],
+}
+
+impl ChannelFactors {
+    /// Factors of these weights of all kernels; those that say nothing are left out.
+    fn new(weights: &[f64], tint: [f64; TINT]) -> Self {
+        let light: f64 = weights.iter().sum();
+        let alive = weights.iter().enumerate().filter(|(_, w)| **w > 1e-6 * light);
+        Self { kernels: alive.map(|(k, w)| (*w, kernels::variance(k))).collect(), tint }
+    }
+
+    /// f at the cosine u of `theta_h`.
+    fn value(&self, u: f64) -> f64 {
+        self.widened(0.0, u)
+    }
+
+    /// f widened by a variance.
+    fn widened(&self, by: f64, u: f64) -> f64 {
+        self.kernels.iter().map(|(weight, variance)| weight * kernel(variance + by, u.min(1.0))).sum()
+    }
+
+    /// Variance of f: that of a Gaussian of the same height and light; `None` where there is no light.
+    fn variance(&self) -> Option<f64> {
+        let (light, height) = self.kernels.iter().fold((0.0, 0.0), |(light, height), (weight, variance)| {
+            (light + weight, height + weight * kernel(*variance, 1.0))
+        });
+        (light > 0.0).then(|| light / (2.0 * PI * height))
+    }
 }
 
 pub(super) const SGD: Row = Row {
@@ -96,45 +158,100 @@ impl Measured {
     /// # Errors
     /// A sentence that says what is wrong with the name, and which is nearest.
     pub fn published(fit: PublishedFit, name: &str) -> Result<Self, String> {
-        let reflectance = published(fit, name)?;
-        // Sixteen bins tell apart all that the fits depend on.
-        Ok(Self::new(&format!("{fit}:{name}"), 16, |wi, wo, _| Some(reflectance(wi, wo))))
+        let material = analytic::find(fit, name)?;
+        let table = MeasuredTable::of(TURNS as usize, |wi, wo| material.reflectance(wi, wo));
+        let factors = factor::factor(&table);
+        Ok(Self::of(&format!("{fit}:{name}"), Material { source: Source::Published(material), factors }))
     }
 
-    /// Factors a table of measurements: reflectance, RGB, for directions to the light and the eye (the normal
-    /// is z). Every pair of `theta_h` and `theta_d` is asked for in `turns` bins of `phi_d` from 0 to 180
-    /// degrees. The third number is the bin's, counted over all, `(theta_h × 90 + theta_d) × turns + phi_d`.
-    /// `None` where nothing was measured.
+    /// Factors a table of measurements.
     #[must_use]
-    pub fn new(name: &str, turns: usize, reflectance: impl Fn(DVec3, DVec3, usize) -> Option<DVec3>) -> Self {
-        let fit = factor::factor(turns, reflectance);
-        Self { name: name.to_owned(), fit: fit.into(), widened: SlopeVariance::ZERO }
+    pub fn new(name: &str, table: MeasuredTable) -> Self {
+        let factors = factor::factor(&table);
+        Self::of(name, Material { source: Source::Table(table), factors })
     }
 
-    /// Variance of the lobe as it was fitted: that of a Gaussian of the same height and light.
+    fn of(name: &str, material: Material) -> Self {
+        let (name, material) = (name.to_owned(), Arc::new(material));
+        Self { name, material, channel: None, widened: SlopeVariance::ZERO }
+    }
+
+    /// The factors.
+    #[must_use]
+    pub fn factors(&self) -> &LobeFactors {
+        &self.material.factors
+    }
+
+    /// Reflectance of the material itself, linear RGB, before factoring, for unit directions to the light and
+    /// the eye about the normal z; zero where one is below the surface.
+    #[must_use]
+    pub fn reflectance(&self, wi: DVec3, wo: DVec3) -> DVec3 {
+        match &self.material.source {
+            Source::Published(material) => material.reflectance(wi, wo),
+            Source::Table(table) => table.reflectance(wi, wo),
+        }
+    }
+
+    /// Reflectance of the material itself at a half angle and a difference angle, without the diffuse part of
+    /// its factors: the mean over the turns of the difference, by both cosines squared.
+    #[must_use]
+    pub fn highlight(&self, theta_h: f64, theta_d: f64) -> DVec3 {
+        let (mut sum, mut all) = (DVec3::ZERO, 0.0);
+        for turn in 0..TURNS {
+            let phi_d = PI * (f64::from(turn) + 0.5) / f64::from(TURNS);
+            let (wi, wo) = table::directions(theta_h, theta_d, phi_d);
+            if wi.z > 0.0 && wo.z > 0.0 {
+                let weight = (wi.z * wo.z).powi(2);
+                sum += self.reflectance(wi, wo) * weight;
+                all += weight;
+            }
+        }
+        if all > 0.0 { sum / all - self.factors().diffuse / PI } else { DVec3::ZERO }
+    }
+
+    /// Lobe of one channel, 0 to 2, whose colours are grey: the channel's own.
+    #[must_use]
+    pub fn channel(&self, channel: usize) -> Self {
+        Self { channel: Some(channel), ..self.clone() }
+    }
+
+    /// Factors of the channels that it shows.
+    fn shown(&self) -> &[ChannelFactors] {
+        let all = &self.factors().channels;
+        self.channel.map_or(all.as_slice(), |c| &all[c..=c])
+    }
+
+    /// Variance of the lobe as it was fitted: the narrowest channel's.
     fn own_variance(&self) -> f64 {
-        let (light, height) =
-            self.fit.kernels.iter().fold((0.0, 0.0), |(light, height), (weight, variance)| {
-                (light + weight, height + weight * kernel(*variance, 1.0))
-            });
-        if light > 0.0 { light / (2.0 * PI * height) } else { 0.1 }
+        self.shown().iter().filter_map(ChannelFactors::variance).reduce(f64::min).unwrap_or(0.1)
+    }
+
+    /// True where nothing widened it.
+    #[must_use]
+    pub fn is_itself(&self) -> bool {
+        self.widened == SlopeVariance::ZERO
     }
 }
 
-/// A von Mises-Fisher kernel of this variance, `1/kappa`, at the cosine `u`; it integrates to one over the
-/// sphere.
-fn kernel(variance: f64, u: f64) -> f64 {
-    let kappa = 1.0 / variance;
-    kappa / (2.0 * PI * -(-2.0 * kappa).exp_m1()) * (kappa * (u - 1.0)).exp()
+impl PartialEq for Measured {
+    fn eq(&self, other: &Self) -> bool {
+        let same = Arc::ptr_eq(&self.material, &other.material) || self.factors() == other.factors();
+        same && self.name == other.name && self.channel == other.channel && self.widened == other.widened
+    }
 }
 
-/// Least cosine whose square divides g: 87 degrees, where measurements end.
-const LEAST_COSINE: f64 = 0.05;
+/// Least cosine whose square divides g: 89.4 degrees, past the middle of the last bin but one.
+const LEAST_COSINE: f64 = 0.01;
 
-/// g from its polynomial, at the cosine of `theta_d`.
-fn colour(tint: &[DVec3; 6], u: f64) -> DVec3 {
+/// Functions of the cosine of `theta_d` that g is a sum of.
+fn tint_basis(u: f64) -> [f64; TINT] {
     let u = u.clamp(LEAST_COSINE, 1.0);
-    tint.iter().rev().fold(DVec3::ZERO, |sum, c| sum * (1.0 - u) + *c).max(DVec3::ZERO) / (u * u)
+    std::array::from_fn(|i| (1.0 - u).powi(i as i32) / (u * u))
+}
+
+/// g from its coefficients, at the cosine of `theta_d`.
+fn tint_at(tint: &[f64; TINT], u: f64) -> f64 {
+    tint.iter().zip(tint_basis(u)).map(|(c, b)| c * b).sum::<f64>().max(0.0)
 }
 
 impl Display for Measured {
@@ -148,12 +265,13 @@ impl Widen for Measured {
         Self { widened: self.widened.widen(by), ..self.clone() }
     }
 
+    /// Of the material as a whole, the mean over its channels.
     fn value_widened(&self, by: SlopeVariance, u: f64) -> f64 {
         if u <= 0.0 {
             return 0.0;
         }
-        let by = self.widened.widen(by).get();
-        self.fit.kernels.iter().map(|(weight, variance)| weight * kernel(variance + by, u.min(1.0))).sum()
+        let (by, shown) = (self.widened.widen(by).get(), self.shown());
+        shown.iter().map(|channel| channel.widened(by, u)).sum::<f64>() / shown.len() as f64
     }
 }
 
@@ -167,11 +285,20 @@ impl Lobe for Measured {
     }
 
     fn tint(&self, u: f64) -> DVec3 {
-        colour(&self.fit.tint, u)
+        let of = |c: usize| tint_at(&self.factors().channels[c].tint, u);
+        self.channel.map_or_else(|| DVec3::new(of(0), of(1), of(2)), |c| DVec3::splat(of(c)))
     }
 
-    fn measured(&self) -> Option<&LobeFactors> {
-        Some(&self.fit)
+    fn colour(&self, by: SlopeVariance, u: f64, difference: f64) -> DVec3 {
+        if self.channel.is_some() || u <= 0.0 {
+            return self.tint(difference) * self.value_widened(by, u);
+        }
+        let by = self.widened.widen(by).get();
+        self.tint(difference) * DVec3::from(self.factors().channels.each_ref().map(|c| c.widened(by, u)))
+    }
+
+    fn measured(&self) -> Option<&Measured> {
+        self.channel.is_none().then_some(self)
     }
 
     fn microfacets(&self) -> Microfacets {
@@ -185,31 +312,42 @@ impl Lobe for Measured {
     /// The numbers are written into the text.
     fn shader(&self) -> Cow<'static, str> {
         let mut text = [include_str!("measured.wgsl"), twin::GAUSSIAN_FACETS, twin::SLOPE_PROFILE].join("\n");
-        let _ = write!(
-            text,
-            "\nconst OWN_VARIANCE: f32 = {:?};\nconst LEAST_DIFFERENCE: f32 = {LEAST_COSINE:?};\n",
-            self.own_variance() as f32
-        );
-        text += "\n// f(u), u the cosine between normal and half-vector, widened by `base`.\nfn lobe_evaluate(base: f32, u: f32) -> f32 {\n    if u <= 0.0 {\n        return 0.0;\n    }\n    var sum = 0.0;\n";
-        for (weight, variance) in &self.fit.kernels {
-            let _ =
-                writeln!(text, "    sum += {:?} * kernel({:?} + base, u);", *weight as f32, *variance as f32);
-        }
-        text += "    return sum;\n}\n\n// g, of u = wi·wh.\nfn lobe_tint(u: f32) -> vec3<f32> {\n    let held = clamp(u, LEAST_DIFFERENCE, 1.0);\n    let x = 1.0 - held;\n    var sum = vec3<f32>(0.0);\n";
-        for c in self.fit.tint.iter().rev() {
-            let _ = writeln!(
-                text,
-                "    sum = sum * x + vec3<f32>({:?}, {:?}, {:?});",
-                c.x as f32, c.y as f32, c.z as f32
-            );
-        }
-        text += "    return max(sum, vec3<f32>(0.0)) / (held * held);\n}\n";
+        let _ = writeln!(text, "\nconst LEAST_DIFFERENCE: f32 = {LEAST_COSINE:?};");
+        text += &self.switch("own_variance() -> f32", |channel| {
+            format!("return {:?};", channel.variance().unwrap_or(0.1) as f32)
+        });
+        text += &self.switch("kernels(by: f32, u: f32) -> f32", |channel| {
+            let term = |(weight, variance): &(f64, f64)| {
+                format!("{:?} * kernel({:?} + by, u)", *weight as f32, *variance as f32)
+            };
+            let sum: Vec<String> = channel.kernels.iter().map(term).collect();
+            format!("return {};", if sum.is_empty() { "0.0".into() } else { sum.join("\n            + ") })
+        });
+        text += &self.switch("tint_polynomial(x: f32) -> f32", |channel| {
+            let mut sum = String::from("0.0");
+            for c in channel.tint.iter().rev() {
+                sum = format!("({sum}) * x + {:?}", *c as f32);
+            }
+            format!("return {sum};")
+        });
         text.into()
     }
 
     /// Slope variance that widened it; the rest is in the text.
     fn base(&self) -> f64 {
         self.widened.get()
+    }
+}
+
+impl Measured {
+    /// A function in WGSL that returns what `body` says of the channel that is being shaded.
+    fn switch(&self, head: &str, body: impl Fn(&ChannelFactors) -> String) -> String {
+        let mut text = format!("\nfn {head} {{\n    switch channel {{\n");
+        for (c, channel) in self.factors().channels.iter().enumerate() {
+            let case = if c == 2 { "default".to_owned() } else { format!("case {c}u") };
+            let _ = writeln!(text, "        {case}: {{\n            {}\n        }}", body(channel));
+        }
+        text + "    }\n}\n"
     }
 }
 
@@ -220,19 +358,14 @@ mod tests {
     use crate::sphere::legendre;
 
     #[test]
-    fn every_published_material_is_factored() {
-        assert_eq!(materials().len(), 100);
+    fn colours_are_finite() {
         for name in materials() {
-            let lobe = SGD.parse;
-            let lobe = lobe(name).unwrap();
-            assert!(lobe.evaluate(1.0).is_finite() && lobe.evaluate(1.0) >= 0.0, "{name}");
-            let diffuse = lobe.measured().unwrap().diffuse;
-            assert!(
-                diffuse.is_finite() && diffuse.min_element() >= 0.0 && diffuse.max_element() < 1.0,
-                "{name} {diffuse}"
-            );
+            let lobe = (SGD.parse)(name).unwrap();
+            let diffuse = lobe.measured().unwrap().factors().diffuse;
+            assert!(diffuse.min_element() >= 0.0 && diffuse.max_element() < 1.0, "{name} {diffuse}");
             for u in [0.0, 0.3, 1.0] {
-                assert!(lobe.tint(u).is_finite() && lobe.tint(u).min_element() >= 0.0, "{name}");
+                let colour = lobe.colour(SlopeVariance::ZERO, 1.0, u);
+                assert!(colour.is_finite() && colour.min_element() >= 0.0, "{name}");
             }
         }
     }
@@ -242,14 +375,16 @@ mod tests {
         // kd + f g with f a kernel between those of the dictionary, and g a polynomial.
         let (kd, f) = (DVec3::new(0.05, 0.1, 0.02), |u: f64| 0.08 * kernel(0.0123, u));
         let g = |u: f64| DVec3::new(1.0, 0.8, 0.6) + DVec3::ONE * (1.0 - u).powi(5);
-        let lobe = Measured::new("test:form", 4, |wi, wo, _| {
+        let table = MeasuredTable::of(4, |wi, wo| {
             let wh = (wi + wo).normalize();
-            Some(kd + f(wh.z) * g(wh.dot(wi)))
+            kd + f(wh.z) * g(wh.dot(wi))
         });
-        assert!(lobe.fit.residual.factored < 0.01, "{:?}", lobe.fit.residual);
-        assert!((lobe.fit.diffuse / PI - kd).length() < 0.01, "{}", lobe.fit.diffuse / PI);
+        let lobe = Measured::new("test:form", table);
+        let LobeFactors { diffuse, residual, .. } = lobe.factors();
+        assert!(residual.factored < 0.01, "{residual:?}");
+        assert!((*diffuse / PI - kd).length() < 0.01, "{}", *diffuse / PI);
         for (u, d) in [(1.0, 1.0), (0.99, 0.8), (0.98, 0.5)] {
-            let (got, expected) = (lobe.evaluate(u) * lobe.tint(d), f(u) * g(d));
+            let (got, expected) = (lobe.colour(SlopeVariance::ZERO, u, d), f(u) * g(d));
             // Two kernels of the dictionary make one between them to 1 % (so does scipy's nonnegative least
             // squares); descent has not quite ended.
             assert!((got - expected).length() < 0.03 * expected.length(), "{u}: {got} {expected}");
