@@ -94,7 +94,7 @@ pub struct Lookups {
     /// True to shade every texel that the filter reads and mix the results: the reference for lobes that are
     /// not aligned, and the only way for methods that cannot be filtered, which take it unasked.
     pub neighbours: bool,
-    /// True to take factors at the lobes' means, as the papers print it.
+    /// True to shade as the papers print it; see [`crate::ndf::FilteredTexel::at_means`].
     pub at_means: bool,
 }
 

@@ -75,7 +75,7 @@ fn every_published_material_is_factored() {
         residuals.push([residual.factored, residual.fitted]);
     }
     assert_eq!(residuals.len(), 100);
-    for (which, median, worst) in [(0, 0.0265, 0.109), (1, 0.0431, 0.188)] {
+    for (which, median, worst) in [(0, 0.0265, 0.109), (1, 0.0390, 0.188)] {
         let mut all: Vec<f64> = residuals.iter().map(|r| r[which]).collect();
         all.sort_by(f64::total_cmp);
         // As measured, rounded up: the tables' worst is black-obsidian, the lobes' is steel, whose published

@@ -173,7 +173,10 @@ impl Question<'_> {
     /// The twelve numbers by the CPU.
     fn answer(&self, probe: &Probe) -> [f64; OUTPUTS] {
         let Probe { params, wi, wo, normal, at_means, channels, by, .. } = probe;
-        let lobe = &self.brdf.lobe;
+        // Of a lobe whose channels differ by more than a colour, the functions of the first.
+        let red = self.brdf.channels().map(|[red, ..]| red);
+        let first = red.as_ref().unwrap_or(self.brdf);
+        let lobe = &first.lobe;
         let directions = Directions::new(wi.as_dvec3(), wo.as_dvec3()).unwrap();
         let prepared = self.method.prepare(self.brdf, params.roughness);
         let texel = FilteredTexel {
@@ -195,7 +198,7 @@ impl Question<'_> {
         // Within four deviations: beyond, what is left is nothing to what the artificial normal brings.
         let visible = lobe.visible_area(eye.z, 0.3 + params.roughness.get());
         let facet = self.brdf.facet(normal.as_dvec3(), params, &directions).x;
-        let width = self.brdf.width(params.roughness);
+        let width = first.width(params.roughness);
         let specular = self.brdf.is_specular();
         let of_lobe = |v: f64| if specular { v } else { 0.0 };
         let masking = if specular { lobe.masking(directions.wo.z, width) } else { 1.0 };

@@ -1,7 +1,7 @@
 // Evaluates the twins at given inputs: `reflect_texel` as a whole, and the functions of a lobe one by one.
 
 const HEAD: u32 = 7u;
-const STRIDE: u32 = HEAD + 3u * TABLE + ALL_LAYERS;
+const STRIDE: u32 = HEAD + 3u * TABLE * CHANNELS + ALL_LAYERS;
 
 @group(0) @binding(0) var<storage, read> input: array<vec4<f32>>;
 @group(0) @binding(1) var<storage, read_write> output: array<vec4<f32>>;
@@ -17,12 +17,12 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) g
     let b = input[first + 1u];
     let c = input[first + 2u];
     var brdf = Brdf(a.x, u32(a.y), u32(a.z), a.w, c.w, Table());
-    for (var k = 0u; k < 3u * TABLE; k++) {
+    for (var k = 0u; k < 3u * TABLE * CHANNELS; k++) {
         brdf.table[k] = input[first + HEAD + k];
     }
     var channels: Channels;
     for (var k = 0u; k < ALL_LAYERS; k++) {
-        channels[k] = input[first + HEAD + 3u * TABLE + k];
+        channels[k] = input[first + HEAD + 3u * TABLE * CHANNELS + k];
     }
     let directions = directions_between(input[first + 3u].xyz, input[first + 4u].xyz);
     let plain = SurfaceParams(b.xyz, b.w, c.xyz);
@@ -41,6 +41,12 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) g
     let wo = vec3<f32>(directions.wo.xy, below * directions.wo.z);
     let by = input[first + 6u];
     let seen_below = directions_between(directions.wi, wo);
-    let displaced = reflect_displaced(&channels, &decoded, plain, brdf, seen_below, mat2x2<f32>(by.xy, by.zw));
+    let stretch = mat2x2<f32>(by.xy, by.zw);
+    var displaced = reflect_displaced(&channels, &decoded, plain, brdf, seen_below, stretch);
+    for (var c = 1u; c < CHANNELS; c++) {
+        turn_to_channel(c);
+        displaced[c] = reflect_displaced(&channels, &decoded, plain, brdf, seen_below, stretch)[c];
+    }
+    turn_to_channel(0u);
     output[3u * i + 2u] = vec4<f32>(displaced, lobe_visible_area(wo.z, 0.3 + b.w));
 }

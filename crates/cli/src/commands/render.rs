@@ -177,7 +177,7 @@ pub(super) struct FilterArguments {
     /// Shade every texel that the filter reads and mix the results, for lobes that are not aligned
     #[arg(long, requires = "scene")]
     neighbours: bool,
-    /// Take cosines at the lobes' means, as the papers print them
+    /// Shade as the papers print it: cosines at the lobes' means, environments by Han et al.'s equation 26
     #[arg(long, requires = "scene")]
     at_means: bool,
 }

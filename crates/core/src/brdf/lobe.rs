@@ -58,12 +58,6 @@ pub trait Lobe: LobeObject + Debug + Display + Send + Sync {
         DVec3::ONE
     }
 
-    /// The lobe widened by a slope variance, in its colours: at the cosine `u = w·n`, and at the cosine
-    /// `wi·wh` of the difference angle.
-    fn colour(&self, by: SlopeVariance, u: f64, difference: f64) -> DVec3 {
-        self.tint(difference) * self.evaluate_widened(by, u)
-    }
-
     /// The material that was measured as a whole: its diffuse part belongs to the lobe, and channels differ
     /// by more than a colour.
     fn measured(&self) -> Option<&Measured> {

@@ -180,17 +180,22 @@ impl Brdf {
     /// Light that one normal sends along the path, per unit of irradiance.
     #[must_use]
     pub fn facet(&self, n: DVec3, params: &SurfaceParams, directions: &Directions) -> DVec3 {
+        if let Some(channels) = self.channels() {
+            let of = |c: usize| channels[c].facet(n, params, directions)[c];
+            return DVec3::new(of(0), of(1), of(2));
+        }
         let fresnel = self.shading.fresnel(params.specular, directions.u);
         let diffuse =
             self.shading.diffuse_share(fresnel) * params.diffuse * (n.dot(directions.wi).max(0.0) / PI);
         if !self.is_specular() {
             return params.diffuse * (n.dot(directions.wi).max(0.0) / PI);
         }
-        let lobe = self.lobe.colour(params.roughness, n.dot(directions.wh), directions.u);
-        if lobe == DVec3::ZERO {
+        let lobe = self.lobe.evaluate_widened(params.roughness, n.dot(directions.wh));
+        if lobe == 0.0 {
             return diffuse;
         }
-        diffuse + lobe * fresnel * self.factor(n, directions, params.roughness)
+        diffuse
+            + self.lobe.tint(directions.u) * fresnel * (lobe * self.factor(n, directions, params.roughness))
     }
 
     /// [`Self::facet`] without what factoring costs: a measured material reflects as it was measured. Where

@@ -132,6 +132,12 @@ fn factor(brdf: Brdf, n: vec3<f32>, directions: Directions, roughness: f32) -> f
     return lobe_masking(i, width) * lobe_masking(o, width) / (4.0 * o);
 }
 
+// Highlight of one normal without Fresnel's term, right in the channel that is shaded.
+fn facet_channel(brdf: Brdf, n: vec3<f32>, roughness: f32, directions: Directions) -> vec3<f32> {
+    let lobe = lobe_evaluate(lobe_widen(brdf.base, roughness), dot(n, directions.wh));
+    return lobe_tint(directions.u) * (lobe * factor(brdf, n, directions, roughness));
+}
+
 // Light that one normal sends along the path, per unit of irradiance.
 fn facet(brdf: Brdf, n: vec3<f32>, params: SurfaceParams, directions: Directions) -> vec3<f32> {
     let lambert = params.diffuse * (max(dot(n, directions.wi), 0.0) / PI);
@@ -140,13 +146,11 @@ fn facet(brdf: Brdf, n: vec3<f32>, params: SurfaceParams, directions: Directions
     }
     let f = fresnel(brdf.shading, params.specular, directions.u);
     let diffuse = diffuse_share(brdf.shading, f) * lambert;
-    let base = lobe_widen(brdf.base, params.roughness);
-    let u = dot(n, directions.wh);
-    var lobe = lobe_tint(directions.u) * lobe_evaluate(base, u);
+    var lobe = facet_channel(brdf, n, params.roughness, directions);
     for (var c = 1u; c < CHANNELS; c++) {
         turn_to_channel(c);
-        lobe[c] = lobe_tint(directions.u).x * lobe_evaluate(base, u);
+        lobe[c] = facet_channel(brdf, n, params.roughness, directions)[c];
     }
     turn_to_channel(0u);
-    return diffuse + lobe * f * factor(brdf, n, directions, params.roughness);
+    return diffuse + lobe * f;
 }

@@ -14,9 +14,6 @@ use super::samples::{SampleGrid, Samples};
 use super::{LEAST_WEIGHT, Level, PARENT_ROUNDS, at, each_texel};
 use crate::surface::Wraps;
 
-/// Strength of the prior: `c` of Tan et al. and `C` of Han et al., 1 in both.
-const STRENGTH: f32 = 1.0;
-
 /// Context of a level's prior: all that it looks at besides the level itself.
 pub(crate) struct PriorContext<'a, const N: usize> {
     pub(super) grid: &'a SampleGrid<N>,
@@ -25,6 +22,8 @@ pub(crate) struct PriorContext<'a, const N: usize> {
     pub(super) wraps: Wraps,
     /// Texels of the finest level.
     pub(super) finest: usize,
+    /// Strength of the prior.
+    pub(super) strength: f32,
 }
 
 /// Number of the pass, of four, that visits a texel.
@@ -45,7 +44,7 @@ pub(super) fn without_prior<const N: usize>(
 
 /// EM with the prior for every texel of a level, from the sums that are in it.
 pub(super) fn with_prior(family: impl Isotropic, context: &PriorContext<'_, 4>, level: &mut Level<4>) {
-    let PriorContext { grid, parent, lobes, wraps, finest } = *context;
+    let PriorContext { grid, parent, lobes, wraps, finest, strength } = *context;
     let size = level.size;
     let count = finest as f32 / size.area() as f32;
     for pass in 0..4 {
@@ -53,7 +52,7 @@ pub(super) fn with_prior(family: impl Isotropic, context: &PriorContext<'_, 4>, 
         let texels: Vec<usize> = (0..size.area()).filter(|i| pass_of(at(size, *i)) == pass).collect();
         let fit = |samples: &mut Samples<4>, i: &usize| {
             let (x, y) = at(size, *i);
-            let mut pulls = [Pull { strength: STRENGTH, count, ..Pull::default() }; MAX_LOBES];
+            let mut pulls = [Pull { strength, count, ..Pull::default() }; MAX_LOBES];
             let mut draw = |neighbour: &[[f32; 4]]| {
                 for (pull, sums) in pulls.iter_mut().zip(neighbour).filter(|(_, s)| s[0] > LEAST_WEIGHT) {
                     let shape = family.decode(sums);

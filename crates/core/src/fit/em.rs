@@ -157,13 +157,13 @@ mod tests {
         ];
         let count = 20_000;
         let normals: Vec<Vec3> = (0..count).map(|_| draw(&known, &mut random)).collect();
-        let samples = samples(Spherical, &normals);
+        let samples = samples(Spherical::<false>, &normals);
         let mut sums = [[0.0; 4]; 3];
         start_from_furthest(&samples, &samples, &mut sums);
-        iterate(Spherical, &samples, 200, &mut sums);
+        iterate(Spherical::<false>, &samples, 200, &mut sums);
         for (alpha, mu, kappa) in known {
             let n = alpha * f64::from(count);
-            let shapes = sums.map(|s| Spherical.decode(&s));
+            let shapes = sums.map(|s| Spherical::<false>.decode(&s));
             let angle = |s: &crate::fit::family::Shape| {
                 mu.dot(DVec3::from_array(s.mean.map(f64::from))).min(1.0).acos()
             };

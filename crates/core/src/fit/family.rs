@@ -94,6 +94,9 @@ pub(crate) trait Isotropic: Copy + Send + Sync {
     /// Statistics that tell the mean normal, the weight among them: the first of all.
     const OF_MEAN: usize;
 
+    /// True where an E-step weighs lobes by their share, as that of a mixture must.
+    const WEIGHED: bool = true;
+
     /// `T(n)`.
     fn sufficient(self, n: Vec3) -> [f32; 3];
 
@@ -149,7 +152,9 @@ impl<F: Isotropic> Family<4> for F {
         }
         let shape = self.decode(sums);
         let mut theta = self.unit_natural(&shape.mean, shape.variance);
-        theta[0] += shape.alpha.ln();
+        if F::WEIGHED {
+            theta[0] += shape.alpha.ln();
+        }
         theta
     }
 
@@ -192,12 +197,13 @@ fn unit_or_up(v: [f32; 3]) -> [f32; 3] {
     if length > 1e-9 { v.map(|c| c / length) } else { [0.0, 0.0, 1.0] }
 }
 
-/// Von Mises-Fisher lobes on the sphere (Han et al. 2007, section 6): `T(n) = (n.x, n.y, 1 - n.z)`.
+/// Von Mises-Fisher lobes on the sphere (Han et al. 2007, section 6): `T(n) = (n.x, n.y, 1 - n.z)`. As PRINTED,
+/// the E-step has no weights (Algorithm 1, line 5), and the prior's `C` counts no normals (equation 23).
 ///
 /// The third statistic is counted from the pole, where most normals are and where `|r|` near 1 needs the
 /// digits.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Spherical;
+pub(crate) struct Spherical<const PRINTED: bool>;
 
 /// `1/kappa` of a mean of length r: Banerjee et al.'s `kappa = (3r - r³)/(1 - r²)`, inverted.
 fn variance_of_length(r: f32) -> f32 {
@@ -226,8 +232,9 @@ pub(crate) fn from_pole(m: &[f32; 3]) -> f32 {
     if m[2] > 0.0 { (m[0] * m[0] + m[1] * m[1]) / (1.0 + m[2]) } else { 1.0 - m[2] }
 }
 
-impl Isotropic for Spherical {
+impl<const PRINTED: bool> Isotropic for Spherical<PRINTED> {
     const OF_MEAN: usize = 4;
+    const WEIGHED: bool = !PRINTED;
 
     #[inline(always)]
     fn sufficient(self, n: Vec3) -> [f32; 3] {
@@ -305,13 +312,16 @@ impl Isotropic for Spherical {
         }
     }
 
-    /// `mu_j = normalize(r_j + C Σ alpha_jk mu_jk)`, the length of `r_j` kept (Han et al. 2007, section 6.3).
+    /// `mu_j = normalize(Σ z n + C Σ alpha_jk mu_jk)`, the length of `r_j` kept: so the likelihood of Han et
+    /// al.'s appendix has it, with `Σ z` a number of normals, as Tan et al. have theirs. Equation 23 prints
+    /// `r_j`, the mean of those normals, in place of their sum.
     fn with_prior(self, sums: &[f32; 4], pull: &Pull) -> [f32; 4] {
         let shape = self.decode(sums);
         if shape.alpha <= DEAD {
             return *sums;
         }
-        let mean = [0, 1, 2].map(|k| shape.length * shape.mean[k] + pull.strength * pull.mean[k]);
+        let normals = if PRINTED { 1.0 } else { shape.alpha * pull.count };
+        let mean = [0, 1, 2].map(|k| normals * shape.length * shape.mean[k] + pull.strength * pull.mean[k]);
         self.encode(&Shape { mean: unit_or_up(mean), ..shape })
     }
 }
@@ -502,25 +512,28 @@ mod tests {
 
     #[test]
     fn sums_decode_to_what_was_encoded() {
-        shapes(Spherical).iter().for_each(|shape| round_trip(Spherical, shape));
+        shapes(Spherical::<false>).iter().for_each(|shape| round_trip(Spherical::<false>, shape));
         shapes(Planar).iter().for_each(|shape| round_trip(Planar, shape));
     }
 
     #[test]
     fn derivatives_chain() {
-        shapes(Spherical).iter().for_each(|shape| slopes(Spherical, shape));
+        shapes(Spherical::<false>).iter().for_each(|shape| slopes(Spherical::<false>, shape));
         shapes(Planar).iter().for_each(|shape| slopes(Planar, shape));
     }
 
     #[test]
     fn theta_is_the_logarithm_of_the_density() {
-        let shape = shapes(Spherical)[0];
+        let shape = shapes(Spherical::<false>)[0];
         let n = Vec3::new(0.1, 0.2, 0.5).normalize();
         let log = |theta: [f32; 4], t: [f32; 4]| log_density(&theta, &t);
         let kappa = 1.0 / f64::from(shape.variance);
         let u = f64::from(dot(&n.to_array(), &shape.mean));
         let expected = (0.3 * kappa / (4.0 * std::f64::consts::PI * kappa.sinh())).ln() + kappa * u;
-        let got = log(Spherical.natural(&Spherical.encode(&shape)), Spherical.statistics(n));
+        let got = log(
+            Spherical::<false>.natural(&Spherical::<false>.encode(&shape)),
+            Spherical::<false>.statistics(n),
+        );
         assert!((f64::from(got) - expected).abs() < 1e-4, "{got} {expected}");
         let flat = Planar.shape(0.3, [0.4, -0.3, 0.0], 0.05);
         let d = f64::from((n.x - 0.4).powi(2) + (n.y + 0.3).powi(2));
@@ -533,7 +546,7 @@ mod tests {
     fn nonsense_decodes_to_something_finite() {
         for fill in [0.0, -1.0, 1e-30, 1.0, 65504.0, -65504.0] {
             for sums in [[fill; 4], [1.0, fill, fill, fill], [fill, 1.0, 0.0, 1.0]] {
-                for shape in [Spherical.decode(&sums), Planar.decode(&sums)] {
+                for shape in [Spherical::<false>.decode(&sums), Planar.decode(&sums)] {
                     assert!(shape.mean.iter().all(|m| m.is_finite()) && shape.variance > 0.0);
                 }
             }

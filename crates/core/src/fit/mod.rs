@@ -99,7 +99,7 @@ words!(Alignment {
 });
 
 /// Fit to be made: kind, number and alignment of the lobes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
     /// The shape of the lobes.
     pub kind: LobeKind,
@@ -107,6 +107,19 @@ pub struct Fit {
     pub lobes: usize,
     /// Alignment of the lobes.
     pub alignment: Alignment,
+    /// Strength of the papers' prior, `c` of Tan et al. and `C` of Han et al.: the number of normals that a
+    /// neighbour's whole texel counts for. Only [`Alignment::Prior`] has one.
+    pub prior: f32,
+    /// True for EM as Han et al. print it: an E-step without weights, and a prior that counts no normals.
+    pub printed: bool,
+}
+
+impl Fit {
+    /// Fit of lobes, with the default alignment and a prior of 1.
+    #[must_use]
+    pub fn new(kind: LobeKind, lobes: usize) -> Self {
+        Self { kind, lobes, alignment: Alignment::default(), prior: 1.0, printed: false }
+    }
 }
 
 /// Value of an attribute, four channels.
@@ -186,7 +199,8 @@ pub fn fit_levels<E: From<Cancelled>>(
     let size = job.surface.size();
     assert!(job.attributes.iter().all(|a| a.size() == size), "attributes are as large as the surface");
     match fit.kind {
-        LobeKind::Spherical => Fitter::<_, 4>::new(Spherical, fit, job).run(emit),
+        LobeKind::Spherical if fit.printed => Fitter::<_, 4>::new(Spherical::<true>, fit, job).run(emit),
+        LobeKind::Spherical => Fitter::<_, 4>::new(Spherical::<false>, fit, job).run(emit),
         LobeKind::Planar => Fitter::<_, 4>::new(Planar, fit, job).run(emit),
         LobeKind::Peaks => peaks::fit_levels(fit.lobes, job, emit),
         #[cfg(test)]
@@ -363,7 +377,9 @@ impl<'a, F: Family<N>, const N: usize> Fitter<'a, F, N> {
         }
         if let (true, Some(parent)) = (prior, parent) {
             let (wraps, finest) = (self.job.surface.wraps(), self.sizes[0].area());
-            family.fit_with_prior(&PriorContext { grid, parent, lobes, wraps, finest }, &mut made);
+            let strength = self.fit.prior;
+            let context = PriorContext { grid, parent, lobes, wraps, finest, strength };
+            family.fit_with_prior(&context, &mut made);
         }
         if refined && level >= FIRST_REFINED {
             let well = level >= FIRST_REFINED_WELL;

@@ -43,7 +43,7 @@ pub(super) fn fit_levels<E: From<Cancelled>>(
 ) -> Result<(), E> {
     assert!(job.attributes.is_empty(), "peaks carry no attributes");
     let sizes = level_sizes(job.surface.size());
-    let samplings = Samplings::new(Spherical, job.surface, &sizes);
+    let samplings = Samplings::new(Spherical::<false>, job.surface, &sizes);
     let total: usize = sizes.iter().map(|s| s.area()).sum();
     let mut done = 0;
     for (level, size) in sizes.iter().enumerate() {
@@ -89,9 +89,9 @@ fn fit_texel(samples: &Samples<4>, peaks: &mut [[f32; 4]]) {
     let mut sums = [[0.0; 4]; MAX_LOBES];
     let sums = &mut sums[..peaks.len()];
     start_from_furthest(samples, samples, sums);
-    iterate(Spherical, samples, PARENT_ROUNDS, sums);
+    iterate(Spherical::<false>, samples, PARENT_ROUNDS, sums);
     let mut problem = Peaks::new(samples, &alive);
-    let start = sums.iter().map(|s| Spherical.decode(s)).filter(|s| s.alpha > 1e-3).flat_map(|s| {
+    let start = sums.iter().map(|s| Spherical::<false>.decode(s)).filter(|s| s.alpha > 1e-3).flat_map(|s| {
         let [x, y, _] = s.mean.map(f64::from);
         [f64::from(s.alpha).ln(), x, y, f64::from(s.variance.recip()).ln()]
     });
@@ -227,7 +227,7 @@ mod tests {
             let t = i as f32 * 0.7;
             let centre = if i % 2 == 0 { 0.4 } else { -0.3 };
             let n = glam::Vec3::new(centre + 0.05 * t.sin(), 0.05 * t.cos(), 1.0).normalize();
-            samples.push(1.0 / 32.0, Spherical.statistics(n));
+            samples.push(1.0 / 32.0, Spherical::<false>.statistics(n));
         }
         samples.pad();
         samples

@@ -293,7 +293,7 @@ mod tests {
     fn merging_keeps_the_sums() {
         let surface = (procedural::find("foil").unwrap().build)(Size::new(64, 64).unwrap());
         let sizes = crate::pyramid::level_sizes(surface.size());
-        let all = Samplings::new(Spherical, &*surface, &sizes);
+        let all = Samplings::new(Spherical::<false>, &*surface, &sizes);
         let sums = |grid: &SampleGrid<4>, size: Size| {
             let mut samples = Samples::default();
             grid.gather(size, (0, 0), &mut samples);
@@ -313,7 +313,7 @@ mod tests {
     #[test]
     fn odd_sizes_weigh_by_area() {
         let surface = (procedural::find("foil").unwrap().build)(Size::new(5, 3).unwrap());
-        let grid = SampleGrid::finest(Spherical, &*surface);
+        let grid = SampleGrid::finest(Spherical::<false>, &*surface);
         let mut samples = Samples::default();
         grid.gather(Size::new(2, 1).unwrap(), (0, 0), &mut samples);
         let weights: Vec<f32> = samples.weights()[..9].to_vec();

@@ -57,7 +57,9 @@ fn spellings_round_trip() {
 fn bad_spellings_say_why() {
     let message = |s: &str| s.parse::<AnyMethod>().unwrap_err().to_string();
     assert_eq!(message("vfm:4"), "there is no method called `vfm`");
-    assert_eq!(message("naive:3"), "method `naive:3`: takes no parameter");
+    assert_eq!(message("toksvig:3"), "method `toksvig:3`: takes no parameter");
+    assert_eq!(message("naive:3"), "method `naive:3`: takes `unnormalised`, or nothing");
+    assert!(message("vmf:2:parent=3").contains("only `prior` has a strength"));
     assert_eq!(
         message("sh:99"),
         "method `sh:99`: the order must be a whole number from 2 to 16, as in `sh:7`"
@@ -129,8 +131,11 @@ fn a_flat_map_gives_back_the_brdf_at_every_level() {
                         FlatLobe::OwnKernel => continue,
                     };
                     // 1e-4 of the peak is the promise; single-precision storage leaves about 1e-6.
+                    // A mean that is not renormalised is short by 1e-6, and an exponent of 400 makes that
+                    // 2.4e-4.
+                    let bound = if method.to_string() == "naive:unnormalised" { 3e-4 } else { 1e-4 };
                     let error = (got - expected).abs() / peak;
-                    assert!(error < 1e-4, "{} {spelling} level {level} {w}: {got} {expected}", method);
+                    assert!(error < bound, "{} {spelling} level {level} {w}: {got} {expected}", method);
                 }
             }
         }
@@ -341,7 +346,7 @@ fn any_finite_channels_decode_to_something_finite() {
 fn effective_lobes_keep_their_energy() {
     // The integral over all directions of the effective lobe is rho_0 of the BRDF, whatever the normals,
     // for methods that promise to be distributions. `fixed` and `naive` promise it too: they only
-    // misplace it. Ndm's partial normalisation does not, by its own account; spherical harmonics only
+    // misplace it. Normals that are not renormalised go dark. Ndm's partial normalisation does not, by its own account; spherical harmonics only
     // where they reach the lobe, L² > 4 s (Han et al., section 5.1): below, clamped ringing adds energy.
     let surface = of_normals((8, 8), |x, y| {
         normal_of_slope(Vec2::new(
@@ -363,7 +368,8 @@ fn effective_lobes_keep_their_energy() {
     for method in methods() {
         let name = method.to_string();
         let too_narrow = matches!(method.flat_lobe(&*lobe), FlatLobe::BandLimited(order) if order < 11);
-        if too_narrow || name.starts_with("ndm") && !name.ends_with("integrated") {
+        let goes_dark = name == "naive:unnormalised";
+        if goes_dark || too_narrow || name.starts_with("ndm") && !name.ends_with("integrated") {
             continue;
         }
         let pyramid = bake(&*method, &surface, Precision::Single);
@@ -374,7 +380,12 @@ fn effective_lobes_keep_their_energy() {
         // factors are interpolated: a few percent. Else the quadrature and, for sh:16, ringing of rho_17 =
         // 0.7 %.
         let planar = name.starts_with("slopes") || name.starts_with("gmm");
-        let tolerance = if planar || name.ends_with("integrated") { 0.05 } else { 0.01 };
+        // A Gaussian of the plane lies on more than its area of the sphere, by the cosine there: 5 %.
+        let tolerance = match () {
+            () if name.ends_with(":printed") && name.starts_with("gmm") => 0.055,
+            () if planar || name.ends_with("integrated") => 0.05,
+            () => 0.01,
+        };
         assert!((total - 1.0).abs() < tolerance, "{name} {total}");
     }
 }

@@ -8,7 +8,7 @@ use std::fmt::{self, Display};
 
 use glam::DVec3;
 
-use super::mixture::{NormalLobe, cosine, effective};
+use super::mixture::{NormalLobe, Response, effective};
 use super::{AnyMethod, Decoded, Describe, Encoding, Form, FormKind, Representation, Sample, StoredSums};
 use crate::bake::Bake;
 use crate::brdf::Lobe;
@@ -81,7 +81,7 @@ impl Describe for Elliptic {
     }
 
     fn fit(&self) -> Option<Fit> {
-        Some(Fit { kind: LobeKind::Elliptic, lobes: self.lobes, alignment: Alignment::Parent })
+        Some(Fit { alignment: Alignment::Parent, ..Fit::new(LobeKind::Elliptic, self.lobes) })
     }
 }
 
@@ -130,10 +130,9 @@ impl Representation for Elliptic {
     }
 
     fn form<'a>(&'a self, lobes: &EllipticMixture) -> Form<'a> {
-        Form::Lobes(lobes.isotropic(), |w, mu| {
-            let lifted = DVec3::new(mu.x, mu.y, (1.0 - mu.x * mu.x - mu.y * mu.y).max(0.0).sqrt());
-            cosine(w, lifted)
-        })
+        // Lifted to the sphere.
+        let lifted = |lobe: NormalLobe| NormalLobe { mean: lobe.direction(), ..lobe };
+        Form::Lobes(lobes.isotropic().into_iter().map(lifted).collect(), Response::Sphere)
     }
 
     fn effective<'a>(
@@ -141,8 +140,8 @@ impl Representation for Elliptic {
         lobes: &EllipticMixture,
         lobe: &'a dyn Lobe,
     ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        let Form::Lobes(lobes, cosine) = self.form(lobes) else { unreachable!("said so above") };
-        effective(&lobes, lobe, cosine)
+        let Form::Lobes(lobes, response) = self.form(lobes) else { unreachable!("said so above") };
+        effective(&lobes, lobe, response)
     }
 }
 

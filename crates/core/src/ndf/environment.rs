@@ -79,6 +79,12 @@ fn of_lobe(
             let towards = local.to_environment * reflected.towards(mu, local.wo);
             cube.lookup(towards, Microfacets::level(brdf.width(spread), reflected.blur, cube.levels()))
         }
+        Technique::Harmonics if printed => {
+            // Equation 26 alone, with what does not depend on the normal.
+            let highlight = over_half_vectors(mu, spread, printed, local);
+            let seen = brdf.fresnel(params.specular, mu.dot(local.wo).max(0.0)) * highlight;
+            return seen + reflected.diffuse_share(brdf.shading, params.specular) * diffuse;
+        }
         Technique::Harmonics => over_half_vectors(mu, spread, printed, local) / reflected.lobe.max(1e-9),
     };
     seen * (params.specular * reflected.scale + reflected.bias)

@@ -23,7 +23,14 @@ fn lobe_light(mu: vec3<f32>, variance: f32, params: SurfaceParams, brdf: Brdf, l
     let reflected = split_sum(cosine, spread);
     var seen: vec3<f32>;
     if environment.technique == HARMONICS {
-        seen = over_half_vectors(local.rotation * local.wo, local.rotation * mu, spread, printed) / max(reflected.lobe, 1e-9);
+        seen = over_half_vectors(local.rotation * local.wo, local.rotation * mu, spread, printed);
+        if printed {
+            // Equation 26 alone, with what does not depend on the normal.
+            let u = max(cosine, 0.0);
+            return seen * lobe_tint(u) * fresnel(brdf.shading, params.specular, u)
+                + reflected_diffuse_share(brdf.shading, reflected.rise, params.specular) * diffuse;
+        }
+        seen /= max(reflected.lobe, 1e-9);
     } else {
         let towards = reflected_towards(reflected, mu, local.wo);
         seen = environment_blurred(local.rotation * towards, blurred_level(brdf_width(brdf, spread), reflected.blur));

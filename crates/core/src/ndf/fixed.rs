@@ -8,7 +8,7 @@ use std::fmt::{self, Display};
 
 use glam::{DVec2, DVec3, Vec2};
 
-use super::mixture::cosine;
+use super::mixture::Response;
 use super::naive::UnitMean;
 use super::{Describe, Encoding, Form, FormKind, Representation, Row, Sample, table::no_parameters};
 use crate::brdf::Lobe;
@@ -44,7 +44,7 @@ impl Describe for Fixed {
     }
 
     fn shader(&self) -> Shader {
-        Shader::new(FormKind::Lobes, &[include_str!("fixed.wgsl"), include_str!("sphere_cosine.wgsl")])
+        Shader::new(FormKind::Lobes, &[include_str!("fixed.wgsl"), include_str!("sphere_response.wgsl")])
     }
 }
 
@@ -78,7 +78,7 @@ impl Representation for Fixed {
     }
 
     fn form<'a>(&'a self, lobes: &UnitMean) -> Form<'a> {
-        Form::Lobes(vec![lobes.alone()], cosine)
+        Form::Lobes(vec![lobes.alone()], Response::Sphere)
     }
 
     fn effective<'a>(&'a self, lobes: &UnitMean, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {

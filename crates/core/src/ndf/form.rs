@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::mixture::{Cosine, NormalLobe, mean_of};
+use super::mixture::{NormalLobe, Response, mean_of};
 use super::{SlopeGaussian, SlopeGrid, direction_or_up};
 use crate::surface::normal_of_slope;
 use crate::units::SlopeVariance;
@@ -28,8 +28,8 @@ impl FormKind {
 
 /// Decoded texel, as it is shaded.
 pub enum Form<'a> {
-    /// Isotropic lobes, and the cosine that they are functions of.
-    Lobes(Vec<NormalLobe>, Cosine),
+    /// Isotropic lobes, and how they answer.
+    Lobes(Vec<NormalLobe>, Response),
     /// A Gaussian of slopes, and the slopes over which diffuse facets and environments are averaged.
     Slopes(SlopeGaussian, &'a SlopeGrid),
     /// A single distribution, with this mean normal: the shorter, the further the normals stray.

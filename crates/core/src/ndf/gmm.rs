@@ -5,17 +5,18 @@
 //! is `2 sigma² + |mu|²`, and that is what mixes linearly. The paper prints `sigma² + |mu|²` in and `E -
 //! |mu|²` out, mixing a variance on one axis with one on two, which doubles the spread between means;
 //! `gmm:J:printed` keeps that. A lobe is shaded in the plane too: the BRDF widened by `sigma²`, as a function
-//! of `|w.xy - mu|`, which for a Gaussian BRDF lobe is the paper's sum of variances.
+//! of `|w.xy - mu|`. The paper has a Gaussian BRDF lobe in that plane, which makes a Gaussian of the sum of
+//! both variances, and so does `printed`. No BRDF of ours is one: their lobes are functions of the angle.
 
 use std::fmt::{self, Display};
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
-use super::mixture::{LobeSums, MixtureEvaluator, NormalLobe, effective, parse_mixture};
+use super::mixture::{LobeSums, MixtureEvaluator, NormalLobe, Response, effective, parse_mixture};
 use super::table::counted;
 use super::{
-    AnyMethod, Decoded, Describe, Encoding, Evaluator, Form, FormKind, ParameterError, Representation, Row,
-    Sample, StoredSums, mixture::spell,
+    AnyMethod, Decoded, Describe, Encoding, Evaluator, FlatLobe, Form, FormKind, ParameterError,
+    Representation, Row, Sample, StoredSums, mixture::spell,
 };
 use crate::brdf::Lobe;
 use crate::fit::{Alignment, Fit, LobeKind, MAX_LOBES};
@@ -26,7 +27,7 @@ use crate::units::SlopeVariance;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gmm {
     fit: Fit,
-    /// True for variances interpolated as printed.
+    /// True for variances interpolated, and lobes shaded, as printed.
     printed: bool,
 }
 
@@ -42,7 +43,8 @@ pub(super) const ROW: Row = Row {
 
 fn parse(words: &[&str]) -> Result<AnyMethod, ParameterError> {
     let fit = |lobes| Gmm::new(lobes).map(|gmm| gmm.fit);
-    parse_mixture(words, fit, "printed").map(|(fit, printed)| AnyMethod::from(Gmm { fit, printed }))
+    parse_mixture(words, fit, &["printed"])
+        .map(|(fit, word)| AnyMethod::from(Gmm { fit, printed: word.is_some() }))
 }
 
 /// The mixture a texel stands for; means are `(x, y, 0)`.
@@ -58,18 +60,6 @@ impl From<GaussianMixture> for Decoded {
     }
 }
 
-/// Cosine `w · n` of a normal as far from `w` as the two are in the plane: the argument of the BRDF's own
-/// profile.
-///
-/// The plane is that of the upper hemisphere; below it nothing is reflected.
-fn planar_cosine(w: DVec3, mu: DVec3) -> f64 {
-    if w.z <= 0.0 {
-        return -1.0;
-    }
-    let far = DVec2::new(w.x - mu.x, w.y - mu.y).length_squared();
-    (1.0 - far).max(0.0).sqrt()
-}
-
 impl Gmm {
     /// This many lobes a texel, 1 to [`MAX_LOBES`], aligned by refinement.
     ///
@@ -77,8 +67,7 @@ impl Gmm {
     /// [`ParameterError::Count`] for another number.
     pub fn new(lobes: usize) -> Result<Self, ParameterError> {
         let lobes = counted(lobes, "number of lobes", 1..=MAX_LOBES, "gmm:4")?;
-        let fit = Fit { kind: LobeKind::Planar, lobes, alignment: Alignment::default() };
-        Ok(Self { fit, printed: false })
+        Ok(Self { fit: Fit::new(LobeKind::Planar, lobes), printed: false })
     }
 
     /// Returns it with another way of making lobes of neighbours correspond.
@@ -88,10 +77,14 @@ impl Gmm {
         self
     }
 
-    /// Returns it with variances interpolated as the paper prints it.
+    /// Returns it with variances interpolated, and lobes shaded, as the paper prints it.
     #[must_use]
     pub fn printed(self) -> Self {
         Self { printed: true, ..self }
+    }
+
+    fn response(&self) -> Response {
+        if self.printed { Response::PlanarGaussian } else { Response::Plane }
     }
 
     fn lobes(&self, sums: &LobeSums) -> Vec<NormalLobe> {
@@ -127,6 +120,10 @@ impl Describe for Gmm {
 
     fn shader(&self) -> Shader {
         Shader::new(FormKind::Lobes, &[include_str!("gmm.wgsl")]).constant("PRINTED", self.printed)
+    }
+
+    fn flat_lobe(&self, _brdf: &dyn Lobe) -> FlatLobe {
+        if self.printed { FlatLobe::OwnKernel } else { FlatLobe::Exact }
     }
 
     fn fit(&self) -> Option<Fit> {
@@ -165,7 +162,7 @@ impl Representation for Gmm {
     }
 
     fn form<'a>(&'a self, lobes: &GaussianMixture) -> Form<'a> {
-        Form::Lobes(lobes.lobes.clone(), planar_cosine)
+        Form::Lobes(lobes.lobes.clone(), self.response())
     }
 
     fn effective<'a>(
@@ -173,12 +170,12 @@ impl Representation for Gmm {
         lobes: &GaussianMixture,
         lobe: &'a dyn Lobe,
     ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        effective(&lobes.lobes, lobe, planar_cosine)
+        effective(&lobes.lobes, lobe, self.response())
     }
 
     fn evaluator<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
         let lobes = |channels: &[f32]| self.lobes(&self.unpack(channels));
-        Box::new(MixtureEvaluator { lobes, cosine: planar_cosine, lobe, directions })
+        Box::new(MixtureEvaluator { lobes, response: self.response(), lobe, directions })
     }
 
     /// From `alpha (2 sigma² + |mu|²)` to what the paper stores.

@@ -19,12 +19,23 @@ fn decode_lobe(channels: ptr<function, Channels>, layer: u32) -> NormalLobe {
     return NormalLobe(vec3<f32>(held, 0.0), alpha, select(second / 2.0, second, PRINTED));
 }
 
-// Cosine w · n of a normal as far from `w` as the two are in the plane; below the horizon nothing is
-// reflected.
-fn cosine(w: vec3<f32>, mu: vec3<f32>) -> f32 {
+// Response of lobes in the plane: the BRDF's lobe, widened, of the cosine of a normal as far from `w` as the
+// two are in the plane; PRINTED, a Gaussian of that distance. Below the horizon nothing is reflected. Twin of
+// `Response::Plane` and `Response::PlanarGaussian` in mixture.rs.
+fn response(widened: f32, w: vec3<f32>, mu: vec3<f32>) -> f32 {
     if w.z <= 0.0 {
-        return -1.0;
+        return 0.0;
     }
     let d = w.xy - mu.xy;
-    return sqrt(max(1.0 - dot(d, d), 0.0));
+    let far = dot(d, d);
+    if PRINTED {
+        let variance = lobe_variance(widened);
+        return exp(-far / (2.0 * variance)) / (2.0 * PI * variance);
+    }
+    return lobe_evaluate(widened, sqrt(max(1.0 - far, 0.0)));
+}
+
+// Mean that diffuse light takes the cosine to.
+fn lambert_mean(lobe: NormalLobe, mu: vec3<f32>) -> vec3<f32> {
+    return mu;
 }

@@ -1,10 +1,12 @@
 //! Common parts of the fitted mixtures: sums of several lobes, spellings, and an evaluator.
 
-use glam::DVec3;
+use std::f64::consts::PI;
+
+use glam::{DVec2, DVec3};
 
 use super::table::count_of;
 use super::{Evaluator, ParameterError};
-use crate::brdf::{AnyLobe, Lobe};
+use crate::brdf::Lobe;
 use crate::fit::{Alignment, Fit, MAX_LOBES};
 use crate::units::SlopeVariance;
 use crate::words::UnknownWord;
@@ -109,39 +111,55 @@ pub(super) fn mean_of(lobes: &[NormalLobe]) -> DVec3 {
     if total > 0.0 { sum / total } else { DVec3::Z }
 }
 
-/// Reads `J[:ALIGNMENT][:WORD]`; the second result says whether the word was there.
-pub(super) fn parse_mixture(
-    words: &[&str],
+/// Reads `J[:ALIGNMENT][:WORD]`; the second result is the word, one of `words`, if it was there.
+pub(super) fn parse_mixture<'w>(
+    said: &[&str],
     fit: impl Fn(usize) -> Result<Fit, ParameterError>,
-    word: &str,
-) -> Result<(Fit, bool), ParameterError> {
-    let mut fit = fit(count_of(words.first()))?;
-    let rest = words.get(1..).unwrap_or_default();
-    let (rest, flag) = match rest.split_last() {
-        Some((last, rest)) if *last == word => (rest, true),
-        _ => (rest, false),
-    };
-    match rest {
+    words: &[&'w str],
+) -> Result<(Fit, Option<&'w str>), ParameterError> {
+    let mut fit = fit(count_of(said.first()))?;
+    let rest = said.get(1..).unwrap_or_default();
+    let word = rest.last().and_then(|last| words.iter().find(|word| *word == last).copied());
+    match &rest[..rest.len() - usize::from(word.is_some())] {
         [] => {}
-        [alignment] => {
-            fit.alignment = alignment.parse().map_err(|e: UnknownWord| {
-                let said = format!("`{alignment}` is no alignment; there are {}, and then `{word}`", e.known);
-                ParameterError::Words(said)
-            })?;
-        }
+        [alignment] => set_alignment(&mut fit, alignment, words)?,
         _ => {
-            let said = format!("takes the number of lobes, an alignment and `{word}`, no more");
+            let words = words.join("` or `");
+            let said = format!("takes the number of lobes, an alignment and `{words}`, no more");
             return Err(ParameterError::Words(said));
         }
     }
-    Ok((fit, flag))
+    Ok((fit, word))
 }
 
-/// The spelling of a mixture; the default alignment goes without saying.
+/// Sets the alignment of a word, and of `prior=C` the prior's strength.
+fn set_alignment(fit: &mut Fit, word: &str, words: &[&str]) -> Result<(), ParameterError> {
+    let (name, strength) = word.split_once('=').map_or((word, None), |(name, c)| (name, Some(c)));
+    fit.alignment = name.parse().map_err(|e: UnknownWord| {
+        let words = words.join("` or `");
+        let said = format!("`{word}` is no alignment; there are {}, and then `{words}`", e.known);
+        ParameterError::Words(said)
+    })?;
+    let Some(strength) = strength else { return Ok(()) };
+    let strength = strength.parse().ok().filter(|c: &f32| (0.0..=1e6).contains(c));
+    match strength {
+        Some(strength) if fit.alignment == Alignment::Prior => fit.prior = strength,
+        _ => {
+            let said = format!("`{word}`: only `prior` has a strength, from 0 to 1e6, as in `prior=0.5`");
+            return Err(ParameterError::Words(said));
+        }
+    }
+    Ok(())
+}
+
+/// The spelling of a mixture; the default alignment goes without saying, and so does a prior of 1.
 pub(super) fn spell(name: &str, fit: &Fit, word: Option<&str>) -> String {
     let mut text = format!("{name}:{}", fit.lobes);
     if fit.alignment != Alignment::default() {
         text += &format!(":{}", fit.alignment.name());
+    }
+    if fit.alignment == Alignment::Prior && fit.prior != 1.0 {
+        text += &format!("={}", fit.prior);
     }
     if let Some(word) = word {
         text += &format!(":{word}");
@@ -149,55 +167,88 @@ pub(super) fn spell(name: &str, fit: &Fit, word: Option<&str>) -> String {
     text
 }
 
-/// The BRDF's argument for a direction and a lobe's mean.
-pub type Cosine = fn(DVec3, DVec3) -> f64;
+/// Response of a lobe of normals: the function that it makes of the BRDF's own lobe.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Response {
+    /// The BRDF's lobe, widened, of the cosine to the mean.
+    Sphere,
+    /// The same of a mean that is shorter than one, as if it were a normal; diffuse light too.
+    Short,
+    /// The same, of the cosine to a normal as far from the mean as the direction is in the plane.
+    Plane,
+    /// A Gaussian of the distance in the plane, whose variance is the sum of both (Tan et al. 2005, section
+    /// 3, as printed).
+    PlanarGaussian,
+}
 
-/// The BRDF's argument for lobes on the sphere.
-pub(super) fn cosine(w: DVec3, mu: DVec3) -> f64 {
-    w.dot(mu)
+impl Response {
+    /// Value in a direction `w`, for a lobe of normals around `mean` that widens the BRDF by `by`.
+    pub(super) fn value(self, lobe: &dyn Lobe, by: SlopeVariance, (w, mean): (DVec3, DVec3)) -> f64 {
+        match self {
+            Self::Sphere | Self::Short => lobe.evaluate_widened(by, w.dot(mean)),
+            Self::Plane => lobe.evaluate_widened(by, planar_cosine(w, mean)),
+            Self::PlanarGaussian => {
+                if w.z <= 0.0 {
+                    return 0.0;
+                }
+                let variance = lobe.slope_variance().unwrap_or(SlopeVariance::ZERO).widen(by).get();
+                let far = DVec2::new(w.x - mean.x, w.y - mean.y).length_squared();
+                (-far / (2.0 * variance)).exp() / (2.0 * PI * variance)
+            }
+        }
+    }
+}
+
+/// Cosine `w · n` of a normal as far from `w` as the two are in the plane: the argument of the BRDF's own
+/// profile.
+///
+/// The plane is that of the upper hemisphere; below it nothing is reflected.
+fn planar_cosine(w: DVec3, mu: DVec3) -> f64 {
+    if w.z <= 0.0 {
+        return -1.0;
+    }
+    let far = DVec2::new(w.x - mu.x, w.y - mu.y).length_squared();
+    (1.0 - far).max(0.0).sqrt()
+}
+
+/// Lobes of normals before a BRDF: response, centres and variances.
+struct Answers {
+    response: Response,
+    /// Weight, centre as the response takes it, and variance.
+    lobes: Vec<(f64, DVec3, SlopeVariance)>,
+}
+
+/// How lobes answer. Diffuse light is no narrow lobe in the half-vector: it takes the cosine to the mean
+/// itself, on the sphere (Tan et al. 2005, section 4.1: `[mu · l]`, and as printed nothing widens it).
+fn answers(lobes: &[NormalLobe], lobe: &dyn Lobe, response: Response) -> Answers {
+    let diffuse = lobe.slope_variance().is_none();
+    let of = |l: &NormalLobe| {
+        let widens = !(diffuse && response == Response::PlanarGaussian);
+        let variance = if widens { l.variance } else { SlopeVariance::ZERO };
+        let lifted = diffuse && response != Response::Short;
+        (l.weight, if lifted { l.direction() } else { l.mean }, variance)
+    };
+    Answers {
+        response: if diffuse { Response::Sphere } else { response },
+        lobes: lobes.iter().map(of).collect(),
+    }
 }
 
 /// The effective lobe of a mixture: the BRDF widened by each lobe, around its mean.
 pub(super) fn effective<'a>(
     lobes: &[NormalLobe],
     lobe: &'a dyn Lobe,
-    cosine: Cosine,
+    response: Response,
 ) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-    let cosine = argument(lobe, cosine);
-    let widened: Vec<(f64, DVec3, AnyLobe)> =
-        lobes.iter().map(|l| (l.weight, cosine.centre(l), lobe.widen(l.variance))).collect();
-    Box::new(move |w| {
-        widened.iter().map(|(weight, mu, lobe)| weight * lobe.evaluate((cosine.of)(w, *mu))).sum()
-    })
-}
-
-/// Argument of a BRDF under lobes of normals: the function, and whether means are lifted to the sphere for
-/// it.
-#[derive(Clone, Copy)]
-struct Argument {
-    of: Cosine,
-    lifted: bool,
-}
-
-impl Argument {
-    /// Centre of a lobe as the function takes it.
-    fn centre(self, lobe: &NormalLobe) -> DVec3 {
-        if self.lifted { lobe.direction() } else { lobe.mean }
-    }
-}
-
-/// Argument of a lobe of reflection. Diffuse light is no narrow lobe in the half-vector: it takes the cosine
-/// to the mean itself, on the sphere (Tan et al. 2005, section 4.1: `[mu · l]`).
-fn argument(lobe: &dyn Lobe, narrow: Cosine) -> Argument {
-    let lifted = lobe.slope_variance().is_none();
-    Argument { of: if lifted { cosine } else { narrow }, lifted }
+    let Answers { response, lobes } = answers(lobes, lobe, response);
+    Box::new(move |w| lobes.iter().map(|(weight, mu, by)| weight * response.value(lobe, *by, (w, *mu))).sum())
 }
 
 /// Evaluates mixtures direction by direction, leaving out what lies beyond a lobe's reach.
 pub(super) struct MixtureEvaluator<'a, L> {
     /// Decodes channels.
     pub(super) lobes: L,
-    pub(super) cosine: Cosine,
+    pub(super) response: Response,
     pub(super) lobe: &'a dyn Lobe,
     pub(super) directions: &'a [DVec3],
 }
@@ -226,14 +277,24 @@ where
     fn evaluate(&self, channels: &[f32], out: &mut [f64]) {
         out.fill(0.0);
         let (mut places, mut values) = (Vec::new(), Vec::new());
-        let cosine = argument(self.lobe, self.cosine);
-        for lobe in (self.lobes)(channels) {
-            let widened = self.lobe.widen(lobe.variance);
-            let (least, centre) = (least_cosine(&*widened), cosine.centre(&lobe));
+        let Answers { response, lobes } = answers(&(self.lobes)(channels), self.lobe, self.response);
+        for (weight, centre, variance) in lobes {
+            let cosine = match response {
+                Response::Sphere | Response::Short => |w: DVec3, mu: DVec3| w.dot(mu),
+                Response::Plane => planar_cosine,
+                Response::PlanarGaussian => {
+                    for (out, w) in out.iter_mut().zip(self.directions) {
+                        *out += weight * response.value(self.lobe, variance, (*w, centre));
+                    }
+                    continue;
+                }
+            };
+            let widened = self.lobe.widen(variance);
+            let least = least_cosine(&*widened);
             places.clear();
             values.clear();
             for (i, w) in self.directions.iter().enumerate() {
-                let u = (cosine.of)(*w, centre);
+                let u = cosine(*w, centre);
                 if u >= least {
                     places.push(i);
                     values.push(u);
@@ -241,7 +302,7 @@ where
             }
             widened.evaluate_all(&mut values);
             for (i, f) in places.iter().zip(&values) {
-                out[*i] += lobe.weight * f;
+                out[*i] += weight * f;
             }
         }
     }

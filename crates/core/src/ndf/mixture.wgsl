@@ -2,7 +2,7 @@
 // `Lobes`.
 //
 // A method brings `decode_lobe` (LAYERS_EACH layers to a lobe, from its first, of weight 0 where it says
-// nothing), `cosine`, and NORMALISED.
+// nothing), `response`, `lambert_mean`, and NORMALISED.
 
 alias Decoded = array<NormalLobe, LOBES>;
 
@@ -49,7 +49,7 @@ fn reflect_texel(
         var specular = 0.0;
         if SPECULAR {
             let widened = lobe_widen(brdf.base, lobe.variance + params.roughness);
-            let f = lobe_evaluate(widened, cosine(directions.wh, lobe.mean));
+            let f = response(widened, directions.wh, lobe.mean);
             if f > 0.0 {
                 var n = mu;
                 if brdf.at_means == 0u {
@@ -58,7 +58,9 @@ fn reflect_texel(
                 specular = f * factor(brdf, n, directions, params.roughness);
             }
         }
-        let diffuse = lambert_evaluate(lobe.variance, dot(directions.wi, mu));
+        // The papers take the cosine at the mean.
+        let spread = select(lobe.variance, 0.0, brdf.at_means == 1u);
+        let diffuse = lambert_evaluate(spread, dot(directions.wi, lambert_mean(lobe, mu)));
         sum += lobe.weight * combine(brdf, params, directions, specular, diffuse);
     }
     return sum;

@@ -40,7 +40,7 @@ pub use form::{Form, FormKind};
 pub use gmm::{GaussianMixture, Gmm};
 pub use leadr::SlopeGrid;
 pub use method::{AnyMethod, Describe, Evaluator, FlatLobe, Method, Representation, Sample};
-pub use mixture::{Cosine, LobeSums, NormalLobe};
+pub use mixture::{LobeSums, NormalLobe, Response};
 pub use naive::Naive;
 pub use ndm::{Ndm, NdmKernel, NdmNormalisation};
 pub use phong::{Phong, PhongPeaks};

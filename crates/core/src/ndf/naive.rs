@@ -7,30 +7,50 @@ use std::fmt::{self, Display};
 
 use glam::{DVec3, Vec3};
 
-use super::mixture::{NormalLobe, cosine};
+use super::mixture::{NormalLobe, Response};
 use super::{
-    Decoded, Describe, Encoding, Form, FormKind, Representation, Row, Sample, direction_or_up,
-    table::no_parameters,
+    AnyMethod, Decoded, Describe, Encoding, Form, FormKind, ParameterError, Representation, Row, Sample,
+    direction_or_up,
 };
 use crate::brdf::Lobe;
 use crate::shader::Shader;
 use crate::units::SlopeVariance;
 
 /// Normalised mip-mapping.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Naive;
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Naive {
+    /// True for a mean that is not renormalised.
+    unnormalised: bool,
+}
 
 pub(super) const ROW: Row = Row {
     name: "naive",
     aliases: &[],
-    parameters: "",
-    summary: "the fine lobe around the mean normal, renormalised",
-    paper: "Han et al. 2007 (baseline)",
-    parse: |words| no_parameters(words, Naive),
-    samples: &["naive"],
+    parameters: "[:unnormalised]",
+    summary: "the fine lobe around the mean normal, renormalised; or `unnormalised`, as short as it comes",
+    paper: "Han et al. 2007, figure 2 (baselines)",
+    parse,
+    samples: &["naive", "naive:unnormalised"],
 };
 
-/// A single direction, and nothing else.
+fn parse(words: &[&str]) -> Result<AnyMethod, ParameterError> {
+    match words {
+        [] => Ok(AnyMethod::from(Naive::default())),
+        ["unnormalised"] => Ok(AnyMethod::from(Naive::default().unnormalised())),
+        _ => Err(ParameterError::Words("takes `unnormalised`, or nothing".to_owned())),
+    }
+}
+
+impl Naive {
+    /// Returns it with the mean normal as short as filtering leaves it: "unnormalised MIP-mapping", which
+    /// Han et al. find essentially black.
+    #[must_use]
+    pub fn unnormalised(self) -> Self {
+        Self { unnormalised: true }
+    }
+}
+
+/// A single mean normal, and nothing else.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnitMean {
     direction: DVec3,
@@ -62,7 +82,8 @@ impl From<UnitMean> for Decoded {
 
 impl Display for Naive {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(ROW.name)
+        f.write_str(ROW.name)?;
+        f.write_str(if self.unnormalised { ":unnormalised" } else { "" })
     }
 }
 
@@ -76,7 +97,7 @@ impl Describe for Naive {
     }
 
     fn shader(&self) -> Shader {
-        Shader::new(FormKind::Lobes, &[include_str!("naive.wgsl"), include_str!("sphere_cosine.wgsl")])
+        Shader::new(FormKind::Lobes, &[include_str!("naive.wgsl")]).constant("SHORT", self.unnormalised)
     }
 }
 
@@ -105,11 +126,15 @@ impl Representation for Naive {
     }
 
     fn decode(&self, sums: &Vec3) -> UnitMean {
+        if self.unnormalised {
+            return UnitMean { direction: sums.as_dvec3() };
+        }
         UnitMean::new(sums.as_dvec3())
     }
 
     fn form<'a>(&'a self, lobes: &UnitMean) -> Form<'a> {
-        Form::Lobes(vec![lobes.alone()], cosine)
+        let response = if self.unnormalised { Response::Short } else { Response::Sphere };
+        Form::Lobes(vec![lobes.alone()], response)
     }
 
     fn effective<'a>(&'a self, lobes: &UnitMean, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {

@@ -9,7 +9,7 @@ use std::fmt::{self, Display};
 
 use glam::DVec3;
 
-use super::mixture::{LobeSums, MixtureEvaluator, NormalLobe, cosine, effective};
+use super::mixture::{LobeSums, MixtureEvaluator, NormalLobe, Response, effective};
 use super::table::{count_of, counted};
 use super::{
     AnyMethod, Decoded, Describe, Encoding, Evaluator, Form, FormKind, ParameterError, Representation, Row,
@@ -94,12 +94,12 @@ impl Describe for Phong {
     }
 
     fn shader(&self) -> Shader {
-        Shader::new(FormKind::Lobes, &[include_str!("phong.wgsl"), include_str!("sphere_cosine.wgsl")])
+        Shader::new(FormKind::Lobes, &[include_str!("phong.wgsl"), include_str!("sphere_response.wgsl")])
             .constant("SHARPEST", SHARPEST)
     }
 
     fn fit(&self) -> Option<Fit> {
-        Some(Fit { kind: LobeKind::Peaks, lobes: self.peaks, alignment: Alignment::Unaligned })
+        Some(Fit { alignment: Alignment::Unaligned, ..Fit::new(LobeKind::Peaks, self.peaks) })
     }
 
     fn filterable(&self) -> bool {
@@ -137,15 +137,15 @@ impl Representation for Phong {
     }
 
     fn form<'a>(&'a self, lobes: &PhongPeaks) -> Form<'a> {
-        Form::Lobes(lobes.peaks.clone(), cosine)
+        Form::Lobes(lobes.peaks.clone(), Response::Sphere)
     }
 
     fn effective<'a>(&'a self, peaks: &PhongPeaks, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        effective(&peaks.peaks, lobe, cosine)
+        effective(&peaks.peaks, lobe, Response::Sphere)
     }
 
     fn evaluator<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
         let lobes = |channels: &[f32]| Self::peaks(&self.unpack(channels));
-        Box::new(MixtureEvaluator { lobes, cosine, lobe, directions })
+        Box::new(MixtureEvaluator { lobes, response: Response::Sphere, lobe, directions })
     }
 }

@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 
 use glam::{DMat2, DVec3};
 
-use super::{Cosine, Form, NormalLobe, Representation, leadr};
+use super::{Form, NormalLobe, Representation, Response, leadr};
 use crate::brdf::{AnyLobe, Brdf, Directions, Lambert, SurfaceParams, Widen};
 use crate::units::SlopeVariance;
 
@@ -55,8 +55,8 @@ pub struct FilteredTexel<'a> {
     pub params: &'a dyn Fn(Option<usize>) -> SurfaceParams,
     /// The material, prepared for shading.
     pub prepared: &'a PreparedBrdf,
-    /// True to shade as the papers print it: factors at the lobes' means; for displaced surfaces, the
-    /// rational form of masking.
+    /// True to shade as the papers print it: factors and diffuse light at the lobes' means; highlights of an
+    /// environment by Han et al.'s equation 26 alone; for displaced surfaces, the rational form of masking.
     pub at_means: bool,
     /// For a displaced surface, how slopes of the map lie on it; `None` for a normal map.
     pub slope_map: Option<DMat2>,
@@ -86,7 +86,7 @@ pub(super) fn reflect<R: Representation>(
     let form = representation.form(&decoded);
     match (&form, texel.slope_map) {
         (Form::Slopes(slopes, grid), Some(by)) => leadr::reflect(&slopes.stretched(by), grid, texel, lights),
-        (Form::Lobes(lobes, cosine), _) => of_lobes(lobes, *cosine, texel, lights),
+        (Form::Lobes(lobes, response), _) => of_lobes(lobes, *response, texel, lights),
         (Form::Slopes(..) | Form::Whole(_), _) => {
             of_whole(representation, &decoded, &form.whole(), texel, lights)
         }
@@ -132,7 +132,7 @@ fn of_whole<R: Representation>(
 /// Light of a sum of isotropic lobes, each shaded by itself.
 fn of_lobes(
     lobes: &[NormalLobe],
-    cosine: Cosine,
+    response: Response,
     texel: &FilteredTexel<'_>,
     lights: &[IncidentLight],
 ) -> DVec3 {
@@ -144,7 +144,7 @@ fn of_lobes(
         let widening = lobe.variance.widen(params.roughness);
         for IncidentLight { directions, irradiance } in lights {
             let f = if brdf.is_specular() {
-                brdf.lobe.evaluate_widened(widening, cosine(directions.wh, lobe.mean))
+                response.value(&*brdf.lobe, widening, (directions.wh, lobe.mean))
             } else {
                 0.0
             };
@@ -154,7 +154,10 @@ fn of_lobes(
             } else {
                 0.0
             };
-            let diffuse = Lambert::SHARP.value_widened(lobe.variance, directions.wi.dot(mu));
+            // The papers take the cosine at the mean.
+            let spread = if texel.at_means { SlopeVariance::ZERO } else { lobe.variance };
+            let diffuse_mean = if response == Response::Short { lobe.mean } else { mu };
+            let diffuse = Lambert::SHARP.value_widened(spread, directions.wi.dot(diffuse_mean));
             let answer = Answer { specular, diffuse };
             sum += *irradiance * lobe.weight * answer.coloured(brdf, &params, directions);
         }

@@ -8,7 +8,7 @@ use std::fmt::{self, Display};
 
 use glam::{DVec3, Vec3};
 
-use super::mixture::{NormalLobe, cosine};
+use super::mixture::{NormalLobe, Response};
 use super::{
     Decoded, Describe, Encoding, Form, FormKind, Representation, Row, Sample, direction_or_up,
     table::no_parameters,
@@ -66,7 +66,7 @@ impl Describe for Toksvig {
     }
 
     fn shader(&self) -> Shader {
-        Shader::new(FormKind::Lobes, &[include_str!("toksvig.wgsl"), include_str!("sphere_cosine.wgsl")])
+        Shader::new(FormKind::Lobes, &[include_str!("toksvig.wgsl"), include_str!("sphere_response.wgsl")])
     }
 }
 
@@ -101,7 +101,7 @@ impl Representation for Toksvig {
     }
 
     fn form<'a>(&'a self, lobes: &MeanLobe) -> Form<'a> {
-        Form::Lobes(vec![NormalLobe::alone(direction_or_up(lobes.mean), lobes.variance)], cosine)
+        Form::Lobes(vec![NormalLobe::alone(direction_or_up(lobes.mean), lobes.variance)], Response::Sphere)
     }
 
     fn effective<'a>(&'a self, lobes: &MeanLobe, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {

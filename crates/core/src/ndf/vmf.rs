@@ -7,13 +7,15 @@
 //! Beckmann and GGX `alpha'² = alpha² + 2/kappa`.
 //!
 //! Stored about the pole, `alpha (1 - r.z)` in place of `alpha r.z`: as linear, and in half floats `1 - |r|²`
-//! keeps its digits (`docs/methods.md` has what that gains). `vmf:J:origin` stores the paper's form.
+//! keeps its digits (`docs/methods.md` has what that gains). `vmf:J:origin` stores the paper's form;
+//! `vmf:J:printed` stores it and fits by EM as printed: an E-step without weights (Algorithm 1, line 5), and
+//! a prior that counts no normals (equation 23).
 
 use std::fmt::{self, Display};
 
 use glam::DVec3;
 
-use super::mixture::{LobeSums, MixtureEvaluator, NormalLobe, cosine, effective, parse_mixture};
+use super::mixture::{LobeSums, MixtureEvaluator, NormalLobe, Response, effective, parse_mixture};
 use super::table::counted;
 use super::{
     AnyMethod, Decoded, Describe, Encoding, Evaluator, Form, FormKind, ParameterError, Representation, Row,
@@ -35,7 +37,7 @@ pub struct Vmf {
 pub(super) const ROW: Row = Row {
     name: "vmf",
     aliases: &[],
-    parameters: ":J[:ALIGNMENT][:origin]",
+    parameters: ":J[:ALIGNMENT][:origin|printed]",
     summary: "J = 1..8 von Mises-Fisher lobes, aligned: refined (default), parent, prior, matched or unaligned",
     paper: "Han et al. 2007, section 6; refined is ours",
     parse,
@@ -46,6 +48,7 @@ pub(super) const ROW: Row = Row {
         "vmf:4:origin",
         "vmf:3:parent",
         "vmf:2:prior",
+        "vmf:2:prior=0.5:printed",
         "vmf:3:matched",
         "vmf:4:unaligned",
     ],
@@ -53,7 +56,10 @@ pub(super) const ROW: Row = Row {
 
 fn parse(words: &[&str]) -> Result<AnyMethod, ParameterError> {
     let fit = |lobes| Vmf::new(lobes).map(|vmf| vmf.fit);
-    parse_mixture(words, fit, "origin").map(|(fit, origin)| AnyMethod::from(Vmf { fit, origin }))
+    parse_mixture(words, fit, &["origin", "printed"]).map(|(fit, word)| {
+        let printed = word == Some("printed");
+        AnyMethod::from(Vmf { fit: Fit { printed, ..fit }, origin: word.is_some() })
+    })
 }
 
 /// Shortest `|r|` that has a direction; below it a lobe is as wide as a lobe can be said to be.
@@ -66,8 +72,7 @@ impl Vmf {
     /// [`ParameterError::Count`] for another number.
     pub fn new(lobes: usize) -> Result<Self, ParameterError> {
         let lobes = counted(lobes, "number of lobes", 1..=MAX_LOBES, "vmf:4")?;
-        let fit = Fit { kind: LobeKind::Spherical, lobes, alignment: Alignment::default() };
-        Ok(Self { fit, origin: false })
+        Ok(Self { fit: Fit::new(LobeKind::Spherical, lobes), origin: false })
     }
 
     /// Returns it with another way of making lobes of neighbours correspond.
@@ -81,6 +86,12 @@ impl Vmf {
     #[must_use]
     pub fn about_origin(self) -> Self {
         Self { origin: true, ..self }
+    }
+
+    /// Returns it fitted and stored as the paper prints it.
+    #[must_use]
+    pub fn printed(self) -> Self {
+        Self { fit: Fit { printed: true, ..self.fit }, origin: true }
     }
 
     /// From `alpha (1 - r.z)` to `alpha r.z`, where asked; and back, since both are `alpha` less the other.
@@ -120,7 +131,8 @@ impl From<VmfMixture> for Decoded {
 
 impl Display for Vmf {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&spell(ROW.name, &self.fit, self.origin.then_some("origin")))
+        let word = if self.fit.printed { "printed" } else { "origin" };
+        f.write_str(&spell(ROW.name, &self.fit, self.origin.then_some(word)))
     }
 }
 
@@ -135,7 +147,7 @@ impl Describe for Vmf {
     }
 
     fn shader(&self) -> Shader {
-        Shader::new(FormKind::Lobes, &[include_str!("vmf.wgsl"), include_str!("sphere_cosine.wgsl")])
+        Shader::new(FormKind::Lobes, &[include_str!("vmf.wgsl"), include_str!("sphere_response.wgsl")])
             .constant("ORIGIN", self.origin)
     }
 
@@ -182,15 +194,15 @@ impl Representation for Vmf {
     }
 
     fn form<'a>(&'a self, lobes: &VmfMixture) -> Form<'a> {
-        Form::Lobes(lobes.lobes.clone(), cosine)
+        Form::Lobes(lobes.lobes.clone(), Response::Sphere)
     }
 
     fn effective<'a>(&'a self, lobes: &VmfMixture, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        effective(&lobes.lobes, lobe, cosine)
+        effective(&lobes.lobes, lobe, Response::Sphere)
     }
 
     fn evaluator<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
         let lobes = |channels: &[f32]| Self::lobes(&self.unpack(channels));
-        Box::new(MixtureEvaluator { lobes, cosine, lobe, directions })
+        Box::new(MixtureEvaluator { lobes, response: Response::Sphere, lobe, directions })
     }
 }

@@ -6,7 +6,6 @@
 //! where a material's peak is as high as chrome's, one f for all leaves four times what three leave.
 
 use glam::DVec3;
-use nalgebra::{SMatrix, SVector};
 
 use super::kernels::{self, KERNELS};
 use super::table::{BINS, Cell, MeasuredTable, difference_angle, half_angle};
@@ -102,18 +101,13 @@ impl Channel {
             turn(fit, true);
             fit.diffuse = self.constant_given(&fit.f, &fit.g);
         });
-        // g is scaled to a mean of one, so that f is the lobe.
-        let (mut sum, mut all) = (0.0, 0.0);
-        for (weight, g) in self.weight.iter().zip(fit.g.iter().cycle()) {
-            sum += weight * g;
-            all += weight;
-        }
-        if sum > 0.0 {
-            let mean = sum / all;
-            fit.g.iter_mut().for_each(|g| *g /= mean);
-            fit.f.iter_mut().for_each(|f| *f *= mean);
-        }
         fit
+    }
+
+    /// Mean of a function of `theta_d` over the table.
+    fn mean_of(&self, g: &[f64]) -> f64 {
+        let sum: f64 = self.weight.iter().zip(g.iter().cycle()).map(|(weight, g)| weight * g).sum();
+        sum / self.weight.iter().sum::<f64>().max(f64::MIN_POSITIVE)
     }
 
     /// Turns until they gain no more.
@@ -177,7 +171,8 @@ impl Channel {
         (0..BINS * BINS).map(of).sum()
     }
 
-    /// Least squares of kernels and polynomial, by turns, from the tables.
+    /// Least squares of kernels and polynomial, by turns, from the tables. Where a highlight lowers the error
+    /// by nothing, there is none.
     fn fitted(&self, tabulated: &Tabulated) -> Fitted {
         let column = |k: usize| -> Vec<f64> {
             let at = |h: usize| kernels::kernel(kernels::variance(k), half_angle(h as f64 + 0.5).cos());
@@ -192,16 +187,26 @@ impl Channel {
             let f: Vec<f64> =
                 (0..BINS).map(|h| weights.iter().zip(&columns).map(|(w, c)| w * c[h]).sum()).collect();
             let tint;
-            (diffuse, tint) = self.polynomial(&f, &cosines);
+            (diffuse, tint) = self.tint_given(&f, &cosines);
             g = cosines.iter().map(|u| tint_at(&tint, *u)).collect();
             let left = self.left(diffuse, &f, &g);
             let enough = left >= best.0 * (1.0 - GAIN);
             if left < best.0 {
-                best = (left, Fitted { diffuse, factors: ChannelFactors::new(&weights, tint) });
+                // g is scaled to a mean of one, so that f is the lobe.
+                let mean = self.mean_of(&g).max(f64::MIN_POSITIVE);
+                let factors = ChannelFactors::new(
+                    &weights.iter().map(|w| w * mean).collect::<Vec<_>>(),
+                    tint.map(|c| c / mean),
+                );
+                best = (left, Fitted { diffuse, factors });
             }
             if enough {
                 break;
             }
+        }
+        let flat = self.constant_given(&[0.0; BINS], &[0.0; BINS]);
+        if self.left(flat, &[0.0; BINS], &[0.0; BINS]) <= best.0 * (1.0 + GAIN) {
+            return Fitted { diffuse: flat, factors: ChannelFactors::default() };
         }
         best.1
     }
@@ -219,37 +224,18 @@ impl Channel {
         kernels::nonnegative_least_squares(columns, &scale, &right)
     }
 
-    /// g times `cos² theta_d` as a polynomial in `1 - cos theta_d`, and the constant, beside a known f. A
-    /// reflectance is a fraction over the two cosines to the normal, which at the narrow half angles of a
-    /// highlight are both `cos theta_d`, and its numerator is smooth.
-    fn polynomial(&self, f: &[f64], cosines: &[f64]) -> (f64, [f64; TINT]) {
-        let mut normal = SMatrix::<f64, { TINT + 1 }, { TINT + 1 }>::zeros();
-        let mut right = SVector::<f64, { TINT + 1 }>::zeros();
-        for (h, f) in f.iter().enumerate() {
-            for (d, u) in cosines.iter().enumerate() {
-                let (mean, weight) = (self.mean[h * BINS + d], self.weight[h * BINS + d]);
-                if weight <= 0.0 {
-                    continue;
-                }
-                let basis = tint_basis(*u);
-                let row = SVector::<f64, { TINT + 1 }>::from_fn(|i, _| basis.get(i).map_or(1.0, |b| f * b));
-                normal += row * row.transpose() * weight;
-                right += row * (weight * mean);
+    /// g and the constant, beside a known f.
+    fn tint_given(&self, f: &[f64], cosines: &[f64]) -> (f64, [f64; TINT]) {
+        let mut columns = vec![vec![1.0; BINS * BINS]; TINT + 1];
+        for (d, u) in cosines.iter().enumerate() {
+            for (column, b) in columns.iter_mut().zip(tint_basis(*u)) {
+                f.iter().enumerate().for_each(|(h, f)| column[h * BINS + d] = f * b);
             }
         }
-        // Of a diffuse material f is nothing, and the powers do not matter: a trace holds them at zero.
-        for i in 0..TINT {
-            normal[(i, i)] = normal[(i, i)] * (1.0 + 1e-12) + f64::MIN_POSITIVE;
-        }
-        let free = normal.cholesky().map(|c| c.solve(&right));
-        match free {
-            Some(solved) if solved[TINT] >= 0.0 => (solved[TINT], std::array::from_fn(|i| solved[i])),
-            _ => {
-                let (normal, right) = (normal.fixed_view::<TINT, TINT>(0, 0), right.fixed_rows::<TINT>(0));
-                let solved = normal.clone_owned().cholesky().map(|c| c.solve(&right));
-                (0.0, solved.map_or([0.0; TINT], |solved| std::array::from_fn(|i| solved[i])))
-            }
-        }
+        let right: Vec<f64> =
+            self.mean.iter().zip(&self.weight).map(|(mean, weight)| mean * weight).collect();
+        let weights = kernels::nonnegative_least_squares(&columns, &self.weight, &right);
+        (weights[TINT], std::array::from_fn(|i| weights[i]))
     }
 
     /// Reflectance away from the highlight: a tenth of the table, by weight, is darker.

@@ -45,5 +45,5 @@ fn lobe_evaluate(base: f32, u: f32) -> f32 {
 // g, of u = wi·wh: the same number in every channel.
 fn lobe_tint(u: f32) -> vec3<f32> {
     let held = clamp(u, LEAST_DIFFERENCE, 1.0);
-    return vec3<f32>(max(tint_polynomial(1.0 - held), 0.0) / (held * held));
+    return vec3<f32>(tint_polynomial(1.0 - held) / (held * held));
 }

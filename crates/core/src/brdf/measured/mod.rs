@@ -71,16 +71,15 @@ pub struct LobeFactors {
 /// Turns of the difference that tell apart all that published fits depend on.
 const TURNS: u32 = 16;
 
-/// Coefficients of g's polynomial.
-pub const TINT: usize = 8;
+/// Number of coefficients of g.
+pub const TINT: usize = 12;
 
 /// The factors of a channel.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChannelFactors {
     /// Kernels of f: weight, and variance on one axis.
     pub kernels: Vec<(f64, f64)>,
-    /// `g cos² theta_d` as a polynomial in `1 - cos theta_d`, from the constant up; below zero it counts as
-    /// zero.
+    /// `g cos² theta_d` by its coefficients of Bernstein's polynomials in `1 - cos theta_d`, none negative.
     pub tint: [f64; TINT],
 }
 
@@ -215,6 +214,12 @@ impl Measured {
         Self { channel: Some(channel), ..self.clone() }
     }
 
+    /// Highlight by the factors, f g in each channel, at the cosines of `theta_h` and of `theta_d`.
+    #[must_use]
+    pub fn factored(&self, u: f64, difference: f64) -> DVec3 {
+        DVec3::from([0, 1, 2].map(|c| self.channel(c).evaluate(u))) * self.tint(difference)
+    }
+
     /// Factors of the channels that it shows.
     fn shown(&self) -> &[ChannelFactors] {
         let all = &self.factors().channels;
@@ -243,15 +248,21 @@ impl PartialEq for Measured {
 /// Least cosine whose square divides g: 89.4 degrees, past the middle of the last bin but one.
 const LEAST_COSINE: f64 = 0.01;
 
-/// Functions of the cosine of `theta_d` that g is a sum of.
+/// Functions of the cosine of `theta_d` that g is a sum of: Bernstein's polynomials in `1 - u`, over `u²`. A
+/// reflectance is a fraction over the two cosines to the normal, which at the narrow half angles of a
+/// highlight are both `cos theta_d`, and its numerator is smooth. None is negative, and neither is g.
 fn tint_basis(u: f64) -> [f64; TINT] {
     let u = u.clamp(LEAST_COSINE, 1.0);
-    std::array::from_fn(|i| (1.0 - u).powi(i as i32) / (u * u))
+    let last = TINT as i32 - 1;
+    std::array::from_fn(|i| BINOMIALS[i] * (1.0 - u).powi(i as i32) * u.powi(last - i as i32) / (u * u))
 }
+
+/// Binomial coefficients of Bernstein's polynomials.
+const BINOMIALS: [f64; TINT] = [1.0, 11.0, 55.0, 165.0, 330.0, 462.0, 462.0, 330.0, 165.0, 55.0, 11.0, 1.0];
 
 /// g from its coefficients, at the cosine of `theta_d`.
 fn tint_at(tint: &[f64; TINT], u: f64) -> f64 {
-    tint.iter().zip(tint_basis(u)).map(|(c, b)| c * b).sum::<f64>().max(0.0)
+    tint.iter().zip(tint_basis(u)).map(|(c, b)| c * b).sum()
 }
 
 impl Display for Measured {
@@ -289,14 +300,6 @@ impl Lobe for Measured {
         self.channel.map_or_else(|| DVec3::new(of(0), of(1), of(2)), |c| DVec3::splat(of(c)))
     }
 
-    fn colour(&self, by: SlopeVariance, u: f64, difference: f64) -> DVec3 {
-        if self.channel.is_some() || u <= 0.0 {
-            return self.tint(difference) * self.value_widened(by, u);
-        }
-        let by = self.widened.widen(by).get();
-        self.tint(difference) * DVec3::from(self.factors().channels.each_ref().map(|c| c.widened(by, u)))
-    }
-
     fn measured(&self) -> Option<&Measured> {
         self.channel.is_none().then_some(self)
     }
@@ -324,11 +327,14 @@ impl Lobe for Measured {
             format!("return {};", if sum.is_empty() { "0.0".into() } else { sum.join("\n            + ") })
         });
         text += &self.switch("tint_polynomial(x: f32) -> f32", |channel| {
-            let mut sum = String::from("0.0");
-            for c in channel.tint.iter().rev() {
-                sum = format!("({sum}) * x + {:?}", *c as f32);
+            let [first, rest @ ..] = channel.tint.map(|c| c as f32);
+            let mut body = format!("var sum = {first:?};\n            var power = x;\n");
+            for (c, binomial) in rest.iter().zip(&BINOMIALS[1..]) {
+                let c = c * *binomial as f32;
+                let _ = writeln!(body, "            sum = sum * (1.0 - x) + {c:?} * power;");
+                body += "            power *= x;\n";
             }
-            format!("return {sum};")
+            body + "            return sum;"
         });
         text.into()
     }
@@ -361,10 +367,11 @@ mod tests {
     fn colours_are_finite() {
         for name in materials() {
             let lobe = (SGD.parse)(name).unwrap();
-            let diffuse = lobe.measured().unwrap().factors().diffuse;
+            let material = lobe.measured().unwrap();
+            let diffuse = material.factors().diffuse;
             assert!(diffuse.min_element() >= 0.0 && diffuse.max_element() < 1.0, "{name} {diffuse}");
             for u in [0.0, 0.3, 1.0] {
-                let colour = lobe.colour(SlopeVariance::ZERO, 1.0, u);
+                let colour = material.factored(1.0, u);
                 assert!(colour.is_finite() && colour.min_element() >= 0.0, "{name}");
             }
         }
@@ -384,7 +391,7 @@ mod tests {
         assert!(residual.factored < 0.01, "{residual:?}");
         assert!((*diffuse / PI - kd).length() < 0.01, "{}", *diffuse / PI);
         for (u, d) in [(1.0, 1.0), (0.99, 0.8), (0.98, 0.5)] {
-            let (got, expected) = (lobe.colour(SlopeVariance::ZERO, u, d), f(u) * g(d));
+            let (got, expected) = (lobe.factored(u, d), f(u) * g(d));
             // Two kernels of the dictionary make one between them to 1 % (so does scipy's nonnegative least
             // squares); descent has not quite ended.
             assert!((got - expected).length() < 0.03 * expected.length(), "{u}: {got} {expected}");
