@@ -3,7 +3,7 @@
 //! Several methods may read one encoding: `slopes:9` what `slopes` has stored, `naive` what `toksvig` has,
 //! `sh:4` what `sh:7` has. [`super::Describe::reads`] says which.
 
-use super::NdmKernel;
+use super::NdmFactors;
 use crate::fit::LobeKind;
 
 /// Encoding: the meaning of a stored map's channels.
@@ -16,8 +16,8 @@ pub enum Encoding {
     MeanNormal,
     /// First and second moments of `n - (0, 0, 1)`.
     PoleMoments {
-        /// Kernel for which the spare channels hold normalisation factors; `None` where they hold ones.
-        factors: Option<NdmKernel>,
+        /// Density for which the spare channels hold normalisation factors; `None` where they hold ones.
+        factors: Option<NdmFactors>,
     },
     /// Mean height, first and second moments of the slope.
     SlopeMoments,

@@ -9,7 +9,7 @@
 //! on a displaced surface it counts by what the eye sees of it, and on a normal map by its share of the map.
 //! Small bright sources are lights, and none of this file's business.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 use glam::{DMat3, DVec3};
 
@@ -115,21 +115,26 @@ fn of_slopes(
     let g = texel.slope_map.map_or(*g, |by| g.stretched(by));
     let mean = (-g.mean).extend(1.0).normalize();
     // Diffuse facets: what the map itself knows of slopes.
-    let (mut lit, mut seen) = (DVec3::ZERO, 0.0);
-    let irradiance = |n: DVec3| local.light.irradiance.of_normals(local.to_environment * n, 0.0, false);
+    let mut facets: Vec<(f64, DVec3)> = Vec::with_capacity(grid.len() * grid.len() + 1);
     g.samples(grid, |sample| {
         let weight =
             if displaced { sample.weight * sample.slope_normal.dot(wo).max(0.0) } else { sample.weight };
         if weight > 0.0 {
-            seen += weight;
-            lit += weight * irradiance(sample.slope_normal.normalize());
+            facets.push((weight, sample.slope_normal.normalize()));
         }
     });
-    let artificial = displaced.then(|| g.artificial(wo));
-    if let Some((n, weight)) = artificial {
-        seen += weight;
-        lit += weight * irradiance(n);
+    if displaced {
+        let (n, weight) = g.artificial(wo);
+        facets.push((weight, n));
     }
+    let seen: f64 = facets.iter().map(|(weight, _)| weight).sum();
+    let shadowed = displaced && brdf.shading == ShadingModel::Shadowed;
+    let open_sky = shadowed.then(|| OpenSky::new(&g, seen, brdf, local));
+    let irradiance = |n: DVec3| {
+        let all = local.light.irradiance.of_normals(local.to_environment * n, 0.0, false);
+        all * open_sky.as_ref().map_or(DVec3::ONE, |sky| sky.share(n))
+    };
+    let lit: DVec3 = facets.iter().map(|(weight, n)| *weight * irradiance(*n)).sum();
     let diffuse = params.diffuse / PI * lit / seen;
     if !brdf.is_specular() {
         return diffuse;
@@ -140,6 +145,56 @@ fn of_slopes(
         .diffuse_share(brdf.shading, params.specular);
     let light = Mirrors { g: g.widen(brdf.width(params.roughness)), grid, mean, params, brdf, local };
     share * diffuse + if displaced { light.of_displaced() } else { light.of_map(g) }
+}
+
+/// Directions of a sky that facets shadow.
+const BEAMS: usize = 32;
+
+/// Direction k of an even lattice over the sphere (a Fibonacci lattice, González 2010).
+fn beam(k: usize) -> DVec3 {
+    let z = 1.0 - (2 * k + 1) as f64 / BEAMS as f64;
+    let (y, x) = (TAU * GOLDEN_TURN * k as f64).sin_cos();
+    let r = (1.0 - z * z).sqrt();
+    DVec3::new(r * x, r * y, z)
+}
+
+/// The golden section of a turn.
+const GOLDEN_TURN: f64 = 0.381_966_011_250_105;
+
+/// Sky over facets that hide each other from it: LEADR's Algorithm 2 in full, `E(n) = ∫ L(wi) max(n·wi, 0)/(1 +
+/// Lambda(wo) + Lambda(wi)) dwi`, as a share of what an open sky sends.
+struct OpenSky {
+    /// Directions, their radiance, and the part of it that facets let through.
+    beams: [(DVec3, DVec3, f64); BEAMS],
+}
+
+impl OpenSky {
+    /// Sky over a Gaussian of slopes, of which the eye sees `seen`, in units in which slopes weigh one.
+    fn new(g: &SlopeGaussian, seen: f64, brdf: &Brdf, local: &LocalEnvironment<'_>) -> Self {
+        let cube = &local.light.radiance;
+        // A texel of this level has a beam's solid angle.
+        let lod = (cube.side() as f64 * (6.0 / BEAMS as f64).sqrt()).log2();
+        let area = g.projected_area(local.wo).max(0.0);
+        let of = |k: usize| {
+            let wi = beam(k);
+            let hidden = area * g.lambda(&*brdf.lobe, wi);
+            // Where no facet can be seen along a direction, none is lit along it.
+            let through = if hidden.is_finite() { seen / (seen + hidden) } else { 0.0 };
+            (wi, cube.lookup(local.to_environment * wi, lod), through)
+        };
+        Self { beams: std::array::from_fn(of) }
+    }
+
+    /// Share of the open sky's light that reaches a facet of this normal.
+    fn share(&self, n: DVec3) -> DVec3 {
+        let (mut through, mut all) = (DVec3::ZERO, DVec3::ZERO);
+        for (wi, radiance, part) in &self.beams {
+            let received = *radiance * n.dot(*wi).max(0.0);
+            all += received;
+            through += received * *part;
+        }
+        through / all.max(DVec3::splat(1e-30))
+    }
 }
 
 /// Facets of a Gaussian of slopes, the lobe's own width in it, that mirror an environment.

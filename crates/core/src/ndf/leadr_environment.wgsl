@@ -92,6 +92,53 @@ fn mirrors_of_map(g: Decoded, narrow: Decoded, plain: SurfaceParams, brdf: Brdf,
     return sum * (split_sum_texel(0u, SPLIT_SUM_ENTRIES).y / total);
 }
 
+// Directions of a sky that facets shadow.
+const BEAMS: u32 = 32u;
+
+// The golden section of a turn.
+const GOLDEN_TURN: f32 = 0.38196601;
+
+// Direction k of an even lattice over the sphere.
+fn beam(k: u32) -> vec3<f32> {
+    let z = 1.0 - f32(2u * k + 1u) / f32(BEAMS);
+    return vec3<f32>(sqrt(max(1.0 - z * z, 0.0)) * circle_point(GOLDEN_TURN * f32(k)), z);
+}
+
+// Sky over facets that hide each other from it: radiance of each beam, and the part that they let through.
+struct OpenSky {
+    beams: array<vec4<f32>, BEAMS>,
+}
+
+// That sky over a Gaussian of slopes, of which the eye sees `seen`, in units in which slopes weigh one.
+fn open_sky(g: Decoded, seen: f32, local: LocalEnvironment) -> OpenSky {
+    // A texel of this level has a beam's solid angle.
+    let lod = log2(environment.size.x * sqrt(6.0 / f32(BEAMS)));
+    let area = max(projected_area(g, local.wo), 0.0);
+    var sky: OpenSky;
+    for (var k = 0u; k < BEAMS; k++) {
+        let wi = beam(k);
+        let towards = projected_area(g, wi);
+        var through = 0.0;
+        if towards > 0.0 {
+            through = seen / (seen + area * lambda(g, wi, towards));
+        }
+        sky.beams[k] = vec4<f32>(environment_radiance(local.rotation * wi, lod), through);
+    }
+    return sky;
+}
+
+// Share of the open sky's light that reaches a facet of this normal.
+fn open_share(sky: ptr<function, OpenSky>, n: vec3<f32>) -> vec3<f32> {
+    var through = vec3<f32>(0.0);
+    var all = vec3<f32>(0.0);
+    for (var k = 0u; k < BEAMS; k++) {
+        let received = (*sky).beams[k].xyz * max(dot(n, beam(k)), 0.0);
+        all += received;
+        through += received * (*sky).beams[k].w;
+    }
+    return through / max(all, vec3<f32>(1e-30));
+}
+
 // Light that a texel sends to the eye.
 fn reflect_environment(
     channels: ptr<function, Channels>,
@@ -104,20 +151,39 @@ fn reflect_environment(
     if local.displaced {
         g = stretched_by(g, local.stretch);
     }
-    var lit = vec3<f32>(0.0);
     var seen = 0.0;
     for (var i = 0u; i < GRID * GRID; i++) {
         let point = slope_point(i);
         let v = slope_normal(g, point.xy);
-        let weight = point.z * select(1.0, max(dot(v, local.wo), 0.0), local.displaced);
-        seen += weight;
-        lit += weight * environment_irradiance(local.rotation * (v * inverseSqrt(dot(v, v))), 0.0, false);
+        seen += point.z * select(1.0, max(dot(v, local.wo), 0.0), local.displaced);
     }
+    let artificial = artificial_normal(g, local.wo);
     if local.displaced {
-        let artificial = artificial_normal(g, local.wo);
-        let weight = ARTIFICIAL_WEIGHT * artificial.w;
-        seen += weight;
-        lit += weight * environment_irradiance(local.rotation * artificial.xyz, 0.0, false);
+        seen += ARTIFICIAL_WEIGHT * artificial.w;
+    }
+    let shadowed = local.displaced && brdf.shading == SHADOWED;
+    var sky: OpenSky;
+    if shadowed {
+        sky = open_sky(g, seen, local);
+    }
+    var lit = vec3<f32>(0.0);
+    for (var i = 0u; i <= GRID * GRID; i++) {
+        var n = artificial.xyz;
+        var weight = select(0.0, ARTIFICIAL_WEIGHT * artificial.w, local.displaced);
+        if i < GRID * GRID {
+            let point = slope_point(i);
+            let v = slope_normal(g, point.xy);
+            weight = point.z * select(1.0, max(dot(v, local.wo), 0.0), local.displaced);
+            n = v * inverseSqrt(dot(v, v));
+        }
+        if weight <= 0.0 {
+            continue;
+        }
+        var share = vec3<f32>(1.0);
+        if shadowed {
+            share = open_share(&sky, n);
+        }
+        lit += weight * share * environment_irradiance(local.rotation * n, 0.0, false);
     }
     let diffuse = plain.diffuse / PI * lit / seen;
     if !SPECULAR {

@@ -42,7 +42,7 @@ pub use leadr::SlopeGrid;
 pub use method::{AnyMethod, Describe, Evaluator, FlatLobe, Method, Representation, Sample};
 pub use mixture::{LobeSums, NormalLobe, Response};
 pub use naive::Naive;
-pub use ndm::{Ndm, NdmKernel, NdmNormalisation};
+pub use ndm::{Ndm, NdmFactors, NdmKernel, NdmNormalisation};
 pub use phong::{Phong, PhongPeaks};
 pub use reflect::{FilteredTexel, IncidentLight, PreparedBrdf};
 pub use sh::{Coefficients, Sh};

@@ -1,14 +1,13 @@
 // A Gaussian in space restricted to the sphere (Olano and North 1997). Twin of ndm.rs.
 //
-// KERNEL is the BRDF's own profile, Gaussian or Pearson; NORMALISATION is partial, integrated or plane.
+// KERNEL is the BRDF's own profile, Gaussian or Pearson with PEARSON_M; NORMALISATION is partial, integrated,
+// plane or tangent.
 
 const BRDF_KERNEL: u32 = 0u;
 const PEARSON: u32 = 2u;
 const INTEGRATED: u32 = 1u;
 const PLANE: u32 = 2u;
-
-// `m` of the Pearson kernel.
-const PEARSON_M: f32 = 8.0;
+const TANGENT: u32 = 3u;
 
 struct Decoded {
     // Mean normal.
@@ -64,15 +63,18 @@ fn across(p: Pivots, x: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(x.x + p.l.x * x.y + p.l.y * x.z, x.y + p.l.z * x.z, x.z);
 }
 
-fn eighth_power(x: f32) -> f32 {
-    let x2 = x * x;
-    let x4 = x2 * x2;
-    return x4 * x4;
+// The power that Pearson's kernel takes, of a number above zero or zero.
+fn pearson_power(x: f32) -> f32 {
+    var power = 1.0;
+    for (var k = 0u; k < u32(PEARSON_M); k++) {
+        power *= x;
+    }
+    return power;
 }
 
 fn generator(d: f32) -> f32 {
     if KERNEL == PEARSON {
-        return eighth_power(max(1.0 - d / (2.0 * PEARSON_M), 0.0));
+        return pearson_power(max(1.0 - d / (2.0 * PEARSON_M), 0.0));
     }
     return exp(-d / 2.0);
 }
@@ -82,7 +84,7 @@ fn flat_integral(v: f32) -> f32 {
     if KERNEL == PEARSON {
         let reach = PEARSON_M * v;
         let most = max(1.0 - 2.0 / reach, 0.0);
-        let behind = eighth_power(most) * most;
+        let behind = pearson_power(most) * most;
         return 2.0 * PI * reach / (PEARSON_M + 1.0) * (1.0 - behind);
     }
     return 2.0 * PI * v * (1.0 - exp(-2.0 / v));
@@ -127,7 +129,8 @@ fn held_above(c: vec3<f32>, least: f32) -> vec3<f32> {
     return vec3<f32>(xx, max(c.y - along * c.z, least) + along * c.z, c.z);
 }
 
-// The density on the plane through the mean, projected from the centre of the sphere.
+// The density on the plane through the mean, or on that which touches the sphere at the mean's direction,
+// projected from the centre of the sphere.
 fn on_plane(g: ptr<function, Decoded>, base: f32, energy: f32, w: vec3<f32>) -> f32 {
     let mu = direction_or_up((*g).mean);
     let u = dot(w, mu);
@@ -140,7 +143,8 @@ fn on_plane(g: ptr<function, Decoded>, base: f32, energy: f32, w: vec3<f32>) -> 
     let a = across(p, axes.a);
     let b = across(p, axes.b);
     let m = across(p, mu);
-    // Restriction of a Gaussian to a plane: its covariance given the coordinate across the plane.
+    // Restriction of a Gaussian to a plane: its covariance given the coordinate across the plane, and its mean,
+    // which is in the middle of the plane through it.
     let am = dot(p.d * a, m);
     let bm = dot(p.d * b, m);
     let mm = dot(p.d * m, m);
@@ -149,8 +153,10 @@ fn on_plane(g: ptr<function, Decoded>, base: f32, energy: f32, w: vec3<f32>) -> 
         dot(p.d * b, b) - bm * bm / mm,
         dot(p.d * a, b) - am * bm / mm,
     ), lobe_variance(base));
-    let d = vec2<f32>(dot(w, axes.a), dot(w, axes.b)) * short / u;
-    let onto = short * short / (u * u * u);
+    let far_off = select(short, 1.0, NORMALISATION == TANGENT);
+    let middle = vec2<f32>(am, bm) * ((far_off - short) / mm);
+    let d = vec2<f32>(dot(w, axes.a), dot(w, axes.b)) * far_off / u - middle;
+    let onto = far_off * far_off / (u * u * u);
     if KERNEL == BRDF_KERNEL {
         return stretched(base, covariance, d) * onto;
     }
@@ -163,7 +169,7 @@ fn effective(g: ptr<function, Decoded>, brdf: Brdf, roughness: f32, w: vec3<f32>
     let base = lobe_widen(brdf.base, roughness);
     var table = brdf.table;
     let energy = tabulated(&table, vec2<f32>(brdf.roughness, brdf.span), 0u, roughness, 0.0);
-    if NORMALISATION == PLANE {
+    if NORMALISATION == PLANE || NORMALISATION == TANGENT {
         return on_plane(g, base, energy, w);
     }
     return on_sphere(g, base, energy, w);
