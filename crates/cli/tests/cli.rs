@@ -19,6 +19,8 @@ fn bake_then_inspect_every_method() {
         ("ndm", 3, "covariance"),
         ("ndm:pearson:integrated", 3, "covariance"),
         ("slopes", 2, "height"),
+        ("stereographic", 2, "covariance"),
+        ("vmf:2:prior=0.5:printed", 2, "lobes"),
         ("sh:3", 4, "coefficients"),
         ("vmf:4", 4, "lobes"),
         ("vmf:2:unaligned:origin", 2, "lobes"),
@@ -655,9 +657,9 @@ fn heights_displace_scenes() {
     assert_eq!(told["method"], "slopes");
     for method in ["slopes", "slopes:9"] {
         let error = &told["methods"][method]["error"];
-        // Waves of several pixels: what is asked here is that it is the displaced truth, not how near.
-        assert!(error["relative_l2"].as_f64().unwrap() < 0.3, "{error}");
-        assert!((error["brightness"].as_f64().unwrap() - 1.0).abs() < 0.1, "{error}");
+        // Measured 0.036 and 0.998; waves of several pixels, of which thirty-two rays show most.
+        assert!(error["relative_l2"].as_f64().unwrap() < 0.038, "{error}");
+        assert!((error["brightness"].as_f64().unwrap() - 1.0).abs() < 0.003, "{error}");
     }
     let compared = json(&[
         "compare",
@@ -676,7 +678,8 @@ fn heights_displace_scenes() {
         "--json",
     ]);
     assert!(
-        compared["methods"]["slopes"]["picture"]["error"]["relative_l2"].as_f64().unwrap() < 0.5,
+        // Measured 0.109, and 0.154 for `toksvig`, which knows nothing of displacement.
+        compared["methods"]["slopes"]["picture"]["error"]["relative_l2"].as_f64().unwrap() < 0.115,
         "{compared}"
     );
 }

@@ -22,8 +22,8 @@ fn environments_light_scenes_and_turn() {
     assert_eq!(told["environment"]["suns"], 1);
     for method in ["vmf:2", "slopes"] {
         let error = &told["methods"][method]["error"];
-        // The truth's noise is 0.04 a pixel, and less of the whole.
-        assert!((error["brightness"].as_f64().unwrap() - 1.0).abs() < 0.04, "{method}: {error}");
+        // Measured 1.0002 and 0.9995.
+        assert!((error["brightness"].as_f64().unwrap() - 1.0).abs() < 0.002, "{method}: {error}");
     }
     // A turned film: its first frame is the environment as it is, its last is turned half around; and so for
     // the other technique.
@@ -69,9 +69,9 @@ fn environments_light_scenes_and_turn() {
     let pictures = ["--scene", "sphere", "--environment", "builtin:white", "--size", "16", "--truth=32"];
     let compared = json(&[&COMPARED[..], &pictures].concat());
     assert_eq!(compared["environment"]["file"], "builtin:white");
-    // Thirty-two rays have a noise of 0.044.
+    // Measured 0.054, of which thirty-two rays have a noise of 0.044.
     let error = &compared["methods"]["vmf:2"]["picture"]["error"];
-    assert!(error["relative_l2"].as_f64().unwrap() < 2.0 * 0.044, "{compared}");
+    assert!(error["relative_l2"].as_f64().unwrap() < 0.057, "{compared}");
 }
 
 #[test]
@@ -94,9 +94,9 @@ fn measured_lobes_bring_their_colours() {
     assert_eq!(status, 0, "{err}");
     assert!(err.contains("sgd:gold-metallic-paint: kd + f(theta_h) g(theta_d) leaves"), "{err}");
     let told: Value = serde_json::from_str(&out).unwrap();
-    // Two lobes are near, as docs/environment.md has it for six; order 7 is not.
+    // Two lobes are near, as docs/environment.md has it for six; order 7 is not: measured 0.0234 and 0.384.
     let error = |method: &str| told["methods"][method]["error"]["relative_l2"].as_f64().unwrap();
-    assert!(error("vmf:2") < 0.1 && error("vmf:2") < error("sh:7"), "{told}");
+    assert!(error("vmf:2") < 0.025 && error("sh:7") > 0.35, "{told}");
     let compared = json(&[&COMPARED[..], &["--brdf", "sgd:blue-fabric"]].concat());
     assert_eq!(compared["brdf"], "sgd:blue-fabric");
 }

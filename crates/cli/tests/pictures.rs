@@ -20,33 +20,59 @@ fn colour(methods: &Value, method: &str) -> f64 {
     methods[method]["error"]["color_error"].as_f64().unwrap()
 }
 
-#[test]
-fn colour_errors_are_below_the_papers() {
-    // Tan et al. 2005, section 5: 0.060 for the disk, 0.041 for it at an oblique angle, 0.058 for the armour;
-    // their truth had 16 rays a pixel. And lobes are ahead of what they were published against: ratios of
-    // 0.29 to 0.66 with 256 rays (docs/scenes.md), to which this truth's noise, common to both, adds some.
-    for (scene, time, paper, against) in [
-        ("disk", "0.15", 0.060, "toksvig"),
-        ("disk-oblique", "0", 0.041, "fixed"),
-        ("armour", "0.5", 0.058, "fixed"),
-    ] {
-        let methods = colour_errors(scene, time, &format!("gmm:4,vmf:4,{against}"));
-        for method in ["gmm:4", "vmf:4"] {
-            assert!(colour(&methods, method) <= paper, "{scene}: {method}");
-            assert!(
-                colour(&methods, method) < 0.75 * colour(&methods, against),
-                "{scene}: {method} and {against}"
-            );
-        }
-    }
+/// Picture of a scene, what the paper's own had, and what ours have.
+struct Picture {
+    scene: &'static str,
+    time: &'static str,
+    /// Colour error in Tan et al. 2005, section 5.
+    paper: f64,
+    /// Method it was published against.
+    against: &'static str,
+    /// Colour errors of `gmm:4`, `vmf:4` and that method, as measured.
+    measured: [f64; 3],
 }
 
 #[test]
-fn armour_far_away_beats_a_fixed_brdf_threefold() {
-    // The paper's own ratio, 0.058 to 0.175.
-    let methods = colour_errors("armour", "1", "gmm:4,vmf:4,fixed");
-    for method in ["gmm:4", "vmf:4"] {
-        assert!(colour(&methods, method) <= 0.33 * colour(&methods, "fixed"), "{method}");
+fn colour_errors_are_as_measured_and_below_the_papers() {
+    // Their truth had 16 rays a pixel; this one has 128, whose noise is common to all methods.
+    for Picture { scene, time, paper, against, measured } in [
+        Picture {
+            scene: "disk",
+            time: "0.15",
+            paper: 0.060,
+            against: "toksvig",
+            measured: [0.010951, 0.009338, 0.016315],
+        },
+        Picture {
+            scene: "disk-oblique",
+            time: "0",
+            paper: 0.041,
+            against: "fixed",
+            measured: [0.003795, 0.002839, 0.006717],
+        },
+        Picture {
+            scene: "armour",
+            time: "0.5",
+            paper: 0.058,
+            against: "fixed",
+            measured: [0.002059, 0.001680, 0.005551],
+        },
+        // 0.175 with a fixed BRDF there.
+        Picture {
+            scene: "armour",
+            time: "1",
+            paper: 0.058,
+            against: "fixed",
+            measured: [0.000312, 0.000309, 0.001379],
+        },
+    ] {
+        let methods = colour_errors(scene, time, &format!("gmm:4,vmf:4,{against}"));
+        for (method, measured) in ["gmm:4", "vmf:4", against].into_iter().zip(measured) {
+            let got = colour(&methods, method);
+            // Rays are seeded: only a change of the program moves it.
+            assert!((got / measured - 1.0).abs() < 0.03, "{scene} at {time}, {method}: {got}");
+            assert!(method == against || got < paper, "{scene}: {method}");
+        }
     }
 }
 

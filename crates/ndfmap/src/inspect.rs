@@ -180,6 +180,13 @@ pub enum DecodedReport {
         /// Mean height in texture widths.
         height: f64,
     },
+    /// A Gaussian of normals on the plane, seen from the pole below.
+    Projected {
+        /// Mean.
+        mean: [f64; 2],
+        /// Covariance.
+        covariance: [[f64; 2]; 2],
+    },
     /// Coefficients of real spherical harmonics.
     Coefficients {
         /// Coefficients: l, then m from -l to l.
@@ -421,6 +428,9 @@ pub fn describe_texel(path: &Path, map: &NdfMap, [level, x, y]: [usize; 3]) -> R
         }
         Decoded::Slopes { height, mean, covariance: [xx, yy, xy] } => {
             DecodedReport::Slopes { mean: mean.to_array(), covariance: [[xx, xy], [xy, yy]], height }
+        }
+        Decoded::Projected { mean, covariance: [xx, yy, xy] } => {
+            DecodedReport::Projected { mean: mean.to_array(), covariance: [[xx, xy], [xy, yy]] }
         }
         Decoded::Coefficients(coefficients) => DecodedReport::Coefficients { coefficients },
         Decoded::Lobes(lobes) => DecodedReport::Lobes { lobes: lobes.iter().map(spherical).collect() },

@@ -262,12 +262,15 @@ fn lobes_carry_their_colours() {
 
 #[test]
 fn every_method_shows_every_scene() {
-    let size = Size { width: 20, height: 16 };
+    let size = Size { width: 60, height: 48 };
     let lookups = Lookups::taps(Filtering::fine(4));
     for row in scene::TABLE {
         let staging = SceneOptions { time: 0.4, map_size: Size { width: 16, height: 16 }, map: None };
         let scene = (row.build)(&staging);
         let geometry = Geometry::new(&scene);
+        let light =
+            |p: &Picture| p.texels().iter().map(|p| p.as_dvec3()).sum::<DVec3>() / p.texels().len() as f64;
+        let expected = light(&truth(&scene, size, 256, 0).picture);
         for method in ndf::TABLE {
             let method = method.samples[0].parse::<AnyMethod>().unwrap();
             let maps = BakedMaps::new(&scene.materials, &method, Precision::Half, &|_| ()).unwrap();
@@ -275,8 +278,17 @@ fn every_method_shows_every_scene() {
                 .render(&scene.camera, size, lookups, &Unobserved)
                 .unwrap();
             let sound = picture.texels().iter().all(|p| p.is_finite() && p.min_element() >= 0.0);
-            let bright = picture.texels().iter().any(|p| p.max_element() > 0.03);
-            assert!(sound && bright, "{} by {}", row.name, method);
+            let off = (light(&picture) - expected).length() / expected.length();
+            // Mixtures send the light that the truth sends: measured 0.021 at most, on the foil. In the plane
+            // a groove's flanks are wider than they are, 0.092. Single lobes may be anything there.
+            let mixture = ["vmf:4", "gmm:4", "phong:4"].contains(&method.to_string().as_str());
+            let bound = match (mixture, row.name, method.to_string().as_str()) {
+                (true, "v-groove", "gmm:4") => 0.1,
+                (true, ..) => 0.025,
+                (false, ..) => f64::INFINITY,
+            };
+            assert!(sound && off < bound, "{} by {method}: {off}", row.name);
+            assert!(light(&picture).max_element() > 0.0, "{} by {method}", row.name);
         }
     }
 }

@@ -11,20 +11,26 @@ pub(crate) fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// The folder of real maps beside the checkout; where it is missing the test says that it skips, on stderr
-/// and in the file that `NDFMAP_SKIPPED` names, which `scripts/test` counts.
+/// The folder of real maps beside the checkout; a test without it is skipped.
 pub(crate) fn data() -> Option<PathBuf> {
     let folder = root().join("../shared/data");
     if folder.exists() {
         return Some(folder);
     }
-    eprintln!("SKIPPED: the data folder is not beside this checkout");
-    if let Some(list) = std::env::var_os("NDFMAP_SKIPPED") {
-        let name = std::thread::current().name().unwrap_or("a test").to_owned();
-        let mut list = std::fs::OpenOptions::new().append(true).create(true).open(list).unwrap();
-        std::io::Write::write_all(&mut list, format!("{name}\n").as_bytes()).unwrap();
-    }
+    skipped("the data folder is not beside this checkout", "NDFMAP_REQUIRE_DATA");
     None
+}
+
+/// Says that the test is skipped: on stderr, and in the file that `NDFMAP_SKIPPED` names, which `scripts/test`
+/// counts. It fails where the variable `insist` is set.
+pub(crate) fn skipped(reason: &str, insist: &str) {
+    assert!(std::env::var_os(insist).is_none(), "{reason}, and {insist} is set");
+    let name = std::thread::current().name().unwrap_or("a test").to_owned();
+    eprintln!("SKIPPED {name}: {reason}");
+    if let Some(list) = std::env::var_os("NDFMAP_SKIPPED") {
+        let mut list = std::fs::OpenOptions::new().append(true).create(true).open(list).unwrap();
+        std::io::Write::write_all(&mut list, format!("{name}: {reason}\n").as_bytes()).unwrap();
+    }
 }
 
 /// Runs `ndfmap` with these words.

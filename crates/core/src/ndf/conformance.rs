@@ -368,7 +368,8 @@ fn effective_lobes_keep_their_energy() {
     for method in methods() {
         let name = method.to_string();
         let too_narrow = matches!(method.flat_lobe(&*lobe), FlatLobe::BandLimited(order) if order < 11);
-        let goes_dark = name == "naive:unnormalised";
+        // The stereographic density is one around the pole alone.
+        let goes_dark = name == "naive:unnormalised" || name == "stereographic";
         if goes_dark || too_narrow || name.starts_with("ndm") && !name.contains("integrated") {
             continue;
         }

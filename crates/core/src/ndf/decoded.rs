@@ -25,6 +25,13 @@ pub enum Decoded {
         /// Covariance of the slopes: xx, yy, xy.
         covariance: [f64; 3],
     },
+    /// A Gaussian of `n.xy/(1 + n.z)`, normals seen on the plane from the pole below.
+    Projected {
+        /// Mean.
+        mean: DVec2,
+        /// Covariance: xx, yy, xy.
+        covariance: [f64; 3],
+    },
     /// Real spherical-harmonic coefficients: l, then m from -l to l.
     Coefficients(Vec<f64>),
     /// Von Mises-Fisher lobes on the sphere that are alive; the variance of each is `1/kappa`.

@@ -21,6 +21,8 @@ pub enum Encoding {
     },
     /// Mean height, first and second moments of the slope.
     SlopeMoments,
+    /// First and second moments of `n.xy/(1 + n.z)`, and the mean normal.
+    ProjectedMoments,
     /// Coefficients of real spherical harmonics.
     Harmonics {
         /// Highest order.
@@ -110,7 +112,7 @@ impl Encoding {
     pub fn layers(self) -> usize {
         match self {
             Self::PoleMoments { .. } => 3,
-            Self::SlopeMoments => 2,
+            Self::SlopeMoments | Self::ProjectedMoments => 2,
             Self::Harmonics { order } => crate::sphere::sh_count(order).div_ceil(4),
             Self::MeanXy | Self::MeanNormal | Self::Lobes { .. } => self.lobes().map_or(1, |l| l.layers(0)),
         }

@@ -3,7 +3,9 @@
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-use super::{AnyMethod, Representation, fixed, gmm, naive, ndm, phong, sh, slopes, toksvig, vmf};
+use super::{
+    AnyMethod, Representation, fixed, gmm, naive, ndm, phong, sh, slopes, stereographic, toksvig, vmf,
+};
 
 /// A row of [`TABLE`].
 pub struct Row {
@@ -24,8 +26,18 @@ pub struct Row {
 }
 
 /// Every method there is.
-pub static TABLE: &[Row] =
-    &[fixed::ROW, naive::ROW, toksvig::ROW, ndm::ROW, slopes::ROW, sh::ROW, vmf::ROW, gmm::ROW, phong::ROW];
+pub static TABLE: &[Row] = &[
+    fixed::ROW,
+    naive::ROW,
+    toksvig::ROW,
+    ndm::ROW,
+    stereographic::ROW,
+    slopes::ROW,
+    sh::ROW,
+    vmf::ROW,
+    gmm::ROW,
+    phong::ROW,
+];
 
 /// Method of every command, unless told otherwise: as many bytes as slopes take, three fifths of their error
 /// on real maps, at texels and between them (`docs/choose.md`).
