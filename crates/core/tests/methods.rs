@@ -1,5 +1,5 @@
-//! Effective lobes of methods against values from an independent script: `tests/reference/methods.py` (numpy and
-//! scipy), at ten texels and twenty directions.
+//! Effective lobes of methods against values from an independent script: `tests/reference/methods.py` (numpy
+//! and scipy), at ten texels and twenty directions.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
 

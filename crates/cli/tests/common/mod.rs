@@ -21,8 +21,8 @@ pub(crate) fn data() -> Option<PathBuf> {
     None
 }
 
-/// Says that the test is skipped: on stderr, and in the file that `NDFMAP_SKIPPED` names, which `scripts/test`
-/// counts. It fails where the variable `insist` is set.
+/// Says that the test is skipped: on stderr, and in the file that `NDFMAP_SKIPPED` names, which
+/// `scripts/test` counts. It fails where the variable `insist` is set.
 pub(crate) fn skipped(reason: &str, insist: &str) {
     assert!(std::env::var_os(insist).is_none(), "{reason}, and {insist} is set");
     let name = std::thread::current().name().unwrap_or("a test").to_owned();

@@ -197,8 +197,9 @@ fn unit_or_up(v: [f32; 3]) -> [f32; 3] {
     if length > 1e-9 { v.map(|c| c / length) } else { [0.0, 0.0, 1.0] }
 }
 
-/// Von Mises-Fisher lobes on the sphere (Han et al. 2007, section 6): `T(n) = (n.x, n.y, 1 - n.z)`. As PRINTED,
-/// the E-step has no weights (Algorithm 1, line 5), and the prior's `C` counts no normals (equation 23).
+/// Von Mises-Fisher lobes on the sphere (Han et al. 2007, section 6): `T(n) = (n.x, n.y, 1 - n.z)`. As
+/// PRINTED, the E-step has no weights (Algorithm 1, line 5), and the prior's `C` counts no normals (equation
+/// 23).
 ///
 /// The third statistic is counted from the pole, where most normals are and where `|r|` near 1 needs the
 /// digits.

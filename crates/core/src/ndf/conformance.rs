@@ -344,10 +344,11 @@ fn any_finite_channels_decode_to_something_finite() {
 
 #[test]
 fn effective_lobes_keep_their_energy() {
-    // The integral over all directions of the effective lobe is rho_0 of the BRDF, whatever the normals,
-    // for methods that promise to be distributions. `fixed` and `naive` promise it too: they only
-    // misplace it. Normals that are not renormalised go dark. Ndm's partial normalisation does not, by its own account; spherical harmonics only
-    // where they reach the lobe, L² > 4 s (Han et al., section 5.1): below, clamped ringing adds energy.
+    // The integral over all directions of the effective lobe is rho_0 of the BRDF, whatever the normals, for
+    // methods that promise to be distributions. `fixed` and `naive` promise it too: they only misplace it.
+    // Normals that are not renormalised go dark. Ndm's partial normalisation does not, by its own account;
+    // spherical harmonics only where they reach the lobe, L² > 4 s (Han et al., section 5.1): below, clamped
+    // ringing adds energy.
     let surface = of_normals((8, 8), |x, y| {
         normal_of_slope(Vec2::new(
             0.25 * ((x * 5 + y) % 8) as f32 / 8.0,

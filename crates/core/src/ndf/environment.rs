@@ -161,8 +161,8 @@ fn beam(k: usize) -> DVec3 {
 /// The golden section of a turn.
 const GOLDEN_TURN: f64 = 0.381_966_011_250_105;
 
-/// Sky over facets that hide each other from it: LEADR's Algorithm 2 in full, `E(n) = ∫ L(wi) max(n·wi, 0)/(1 +
-/// Lambda(wo) + Lambda(wi)) dwi`, as a share of what an open sky sends.
+/// Sky over facets that hide each other from it: LEADR's Algorithm 2 in full, `E(n) = ∫ L(wi) max(n·wi, 0)/(1
+/// + Lambda(wo) + Lambda(wi)) dwi`, as a share of what an open sky sends.
 struct OpenSky {
     /// Directions, their radiance, and the part of it that facets let through.
     beams: [(DVec3, DVec3, f64); BEAMS],

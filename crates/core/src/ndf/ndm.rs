@@ -38,7 +38,8 @@ pub enum NdmKernel {
     Profile,
     /// `e^{-d/2}`.
     Gaussian,
-    /// Pearson type II, `max(0, 1 - d/(2m))^m`, m = 8 unless told (the stored text of the paper garbles `2m`).
+    /// Pearson type II, `max(0, 1 - d/(2m))^m`, m = 8 unless told (the stored text of the paper garbles
+    /// `2m`).
     Pearson,
 }
 
@@ -95,7 +96,7 @@ impl Default for Ndm {
 pub(super) const ROW: Row = Row {
     name: "ndm",
     aliases: &[],
-    parameters: "[:KERNEL][:NORMALISATION]",
+    parameters: "[:KERNEL[=M]][:NORMALISATION]",
     summary: "3-D Gaussian of the normals, restricted to the sphere; kernels brdf, gaussian, pearson[=M]; \
               normalisations partial, integrated[=EXPONENT], plane, tangent",
     paper: "Olano and North 1997",
@@ -531,8 +532,8 @@ impl Ndm {
         }
     }
 
-    /// The density on the plane through the mean, or on that which touches the sphere at the mean's direction,
-    /// projected from the centre of the sphere.
+    /// The density on the plane through the mean, or on that which touches the sphere at the mean's
+    /// direction, projected from the centre of the sphere.
     fn on_plane<'a>(
         self,
         g: SpaceGaussian,

@@ -143,8 +143,8 @@ fn on_plane(g: ptr<function, Decoded>, base: f32, energy: f32, w: vec3<f32>) -> 
     let a = across(p, axes.a);
     let b = across(p, axes.b);
     let m = across(p, mu);
-    // Restriction of a Gaussian to a plane: its covariance given the coordinate across the plane, and its mean,
-    // which is in the middle of the plane through it.
+    // Restriction of a Gaussian to a plane: its covariance given the coordinate across the plane, and its
+    // mean, which is in the middle of the plane through it.
     let am = dot(p.d * a, m);
     let bm = dot(p.d * b, m);
     let mm = dot(p.d * m, m);

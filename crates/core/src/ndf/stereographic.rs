@@ -1,5 +1,5 @@
-//! `stereographic`: a Gaussian on the plane, projected to the full sphere from the pole below. Olano and North
-//! 1997, section 4.
+//! `stereographic`: a Gaussian on the plane, projected to the full sphere from the pole below. Olano and
+//! North 1997, section 4.
 //!
 //! One of the first densities that they tried, `n([x y]/(z + 1), mu, Σ)`, and gave up: "quite difficult to
 //! combine and filter". It is here to show that. Mean and second moments of `s = n.xy/(1 + n.z)` are stored,

@@ -37,8 +37,9 @@ pub struct Vmf {
 pub(super) const ROW: Row = Row {
     name: "vmf",
     aliases: &[],
-    parameters: ":J[:ALIGNMENT][:origin|printed]",
-    summary: "J = 1..8 von Mises-Fisher lobes, aligned: refined (default), parent, prior, matched or unaligned",
+    parameters: ":J[:ALIGNMENT][:FORM]",
+    summary: "J = 1..8 von Mises-Fisher lobes, aligned: refined (default), parent, prior[=C], matched or \
+              unaligned; form origin or printed",
     paper: "Han et al. 2007, section 6; refined is ours",
     parse,
     samples: &[

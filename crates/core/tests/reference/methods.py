@@ -190,6 +190,27 @@ def slopes(normals):
     return channels, lobe
 
 
+def stereographic(normals):
+    p = normals[:, :2] / (1 + normals[:, 2:])
+    second = (p[:, 0] ** 2).mean(), (p[:, 1] ** 2).mean(), (p[:, 0] * p[:, 1]).mean()
+    channels = float32([*p.mean(0), *second, *normals.mean(0)])
+    x, y, xx, yy, xy = channels[:5]
+    covariance = np.array([[xx - x * x, xy - x * y], [xy - x * y, yy - y * y]])
+
+    def lobe(f, w):
+        if f is lambert_lobe:
+            return np.maximum(w @ channels[5:], 0)
+        v = 1 / f.exponent
+        sigma = covariance + np.eye(2) * v / 4
+        d = w[:, :2] / (1 + w[:, 2:]) - [x, y]
+        q = np.einsum("wi,ij,wj->w", d, np.linalg.inv(sigma), d)
+        # A flat map's integral, over the polar angle.
+        flat = quad(lambda t: np.exp(-2 * np.tan(t / 2) ** 2 / v) * np.sin(t), 0, 3.1, points=[0.1, 0.3, 1], epsabs=1e-14)[0] * 4 / v
+        return np.exp(-q / 2) / (2 * np.pi * np.sqrt(np.linalg.det(sigma))) / flat
+
+    return channels, lobe
+
+
 def widened(s):
     # Blinn-Phong of slope variance 1/s, widened by a variance.
     lobe = lambda by, u: blinn_phong(1 / (1 / s + by), u)
@@ -227,6 +248,7 @@ METHODS = {
     "ndm:pearson": lambda n: ndm(n, "pearson"),
     "ndm:plane": lambda n: ndm(n, "brdf", tangent=False),
     "ndm:tangent": lambda n: ndm(n, "brdf", tangent=True),
+    "stereographic": stereographic,
     "slopes": slopes,
 }
 

@@ -130,8 +130,8 @@ impl Channel {
         if all > 0.0 { ((0..BINS * BINS).map(of).sum::<f64>() / all).max(0.0) } else { 0.0 }
     }
 
-    /// The best factor beside a `known` one, and the best constant with both, unless it is `held`. `at(i, k)` is the cell of entry
-    /// i of the one that is sought and entry k of the known one.
+    /// The best factor beside a `known` one, and the best constant with both, unless it is `held`. `at(i, k)`
+    /// is the cell of entry i of the one that is sought and entry k of the known one.
     ///
     /// The best entry is linear in the constant, `(S_i - kd G_i)/Q_i`; put in, least squares have one unknown
     /// left.

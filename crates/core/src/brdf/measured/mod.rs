@@ -1,4 +1,5 @@
-//! Measured lobes: `kd + f(theta_h) g(theta_d)` in each channel, f a sum of kernels that widen in closed form.
+//! Measured lobes: `kd + f(theta_h) g(theta_d)` in each channel, f a sum of kernels that widen in closed
+//! form.
 //!
 //! Han et al. 2007, section 4, take measured materials in the factored form of Lawrence et al. 2006: f is a
 //! lobe around the half-vector, and g does not depend on the normal. The factors are fitted to a table of
