@@ -18,6 +18,8 @@ import OpenImageIO as oiio
 from sklearn.mixture import GaussianMixture
 
 SIDE, LOBES = 128, 4
+# As many as our own fits have.
+STARTS = 4
 # What rounding to 8 bits leaves, (2/255)²/12: the floor of both programs, or equal normals would be infinitely likely.
 FLOOR = 5e-6
 
@@ -54,7 +56,7 @@ def mean_log(logs, weights):
     return float((top + np.log(np.exp(joint - top).sum(0))).mean())
 
 
-def movmf(normals, rng, rounds=100, starts=1):
+def movmf(normals, rng, starts, rounds=100):
     """EM for von Mises-Fisher mixtures (Banerjee et al. 2005), the most likely of several starts."""
     best = -np.inf
     for _ in range(starts):
@@ -103,7 +105,7 @@ def main():
                         start = time.perf_counter()
                         if method == "gmm":
                             points = samples[:, :2]
-                            fit = GaussianMixture(LOBES, covariance_type="spherical", reg_covar=FLOOR, random_state=0)
+                            fit = GaussianMixture(LOBES, covariance_type="spherical", reg_covar=FLOOR, random_state=0, n_init=STARTS)
                             fit.fit(points)
                             seconds += time.perf_counter() - start
                             logs = [log_gauss(points, m, v) for m, v in zip(fit.means_, fit.covariances_)]
@@ -112,7 +114,7 @@ def main():
                                 log_gauss(points, np.array(lobe["mean"]), max(lobe["variance"], FLOOR)) for lobe in lobes
                             ]
                         else:
-                            theirs.append(movmf(samples, rng))
+                            theirs.append(movmf(samples, rng, starts=STARTS))
                             seconds += time.perf_counter() - start
                             logs = [
                                 log_vmf(samples, np.array(lobe["mean"]), min(lobe["kappa"], 1 / FLOOR)) for lobe in lobes

@@ -67,11 +67,15 @@ fn lobes_are_as_likely_as_independent_fits() {
         let mut gain = 0.0;
         for row in rows.iter().filter(|r| r["method"] == method) {
             eprintln!("{row}");
-            gain += row["ours"].as_f64().unwrap() - row["independent"].as_f64().unwrap();
+            let own = row["ours"].as_f64().unwrap() - row["independent"].as_f64().unwrap();
+            // Which of its many local optima a program ends in is luck: the worst of eight rows is -0.019.
+            assert!(own > -0.025, "{row}");
+            gain += own;
         }
-        // Mean log-likelihood a normal over two maps and two levels. In a single block, which of its many
-        // local optima either program ends in is luck, so rows are not compared one by one. Seeds are fixed.
-        assert!(gain >= 0.0, "{method}: {gain}");
+        // Mean log-likelihood a normal over two maps and two levels, as many starts on either side: measured
+        // 0.094 and 0.045. Seeds are fixed, but not the versions of their libraries.
+        let measured = if method == "gmm" { 0.094 } else { 0.045 };
+        assert!(gain > 0.5 * measured, "{method}: {gain}");
     }
 }
 

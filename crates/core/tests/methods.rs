@@ -18,7 +18,7 @@ fn bound(method: &str, lobe: &str) -> f64 {
         // Our closed form of the widened cosine (`brdf/lambert.rs`) is an approximation, worse the wider: of
         // these peaks one is as wide as an exponent of 8.
         ("phong:3", "lambert") => 2e-3,
-        ("vmf:3" | "gmm:3", "lambert") => 4e-4,
+        ("vmf:3" | "vmf:3:series" | "gmm:3", "lambert") => 4e-4,
         // Measured at most 8e-10: powers, for which this program has a polynomial.
         _ => 1e-9,
     }

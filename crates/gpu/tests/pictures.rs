@@ -182,8 +182,9 @@ fn the_sampler_is_near_our_taps() {
     let apart = relative_l2(&theirs, &ours);
     eprintln!("sampler and taps are {apart:.4} apart");
     // Samplers may take the longer of a pixel's two sides for its reach and mix levels over half the way
-    // only: a few hundredths.
-    assert!(apart < 0.1, "{apart}");
+    // only: a few hundredths. Software Vulkan does neither: measured 0.002.
+    let bound = if device.is_software() { 0.004 } else { 0.1 };
+    assert!(apart < bound, "{apart}");
 }
 
 #[test]

@@ -175,7 +175,7 @@ impl Representation for Gmm {
 
     fn evaluator<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
         let lobes = |channels: &[f32]| self.lobes(&self.unpack(channels));
-        Box::new(MixtureEvaluator { lobes, response: self.response(), lobe, directions })
+        Box::new(MixtureEvaluator { lobes, response: self.response(), rho: Vec::new(), lobe, directions })
     }
 
     /// From `alpha (2 sigma² + |mu|²)` to what the paper stores.

@@ -22,11 +22,12 @@ fn decode_lobe(channels: ptr<function, Channels>, layer: u32) -> NormalLobe {
 // Response of lobes in the plane: the BRDF's lobe, widened, of the cosine of a normal as far from `w` as the
 // two are in the plane; PRINTED, a Gaussian of that distance. Below the horizon nothing is reflected. Twin of
 // `Response::Plane` and `Response::PlanarGaussian` in mixture.rs.
-fn response(widened: f32, w: vec3<f32>, mu: vec3<f32>) -> f32 {
+fn response(brdf: Brdf, lobe: NormalLobe, roughness: f32, w: vec3<f32>) -> f32 {
     if w.z <= 0.0 {
         return 0.0;
     }
-    let d = w.xy - mu.xy;
+    let widened = lobe_widen(brdf.base, lobe.variance + roughness);
+    let d = w.xy - lobe.mean.xy;
     let far = dot(d, d);
     if PRINTED {
         let variance = lobe_variance(widened);

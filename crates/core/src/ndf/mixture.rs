@@ -8,6 +8,7 @@ use super::table::count_of;
 use super::{Evaluator, ParameterError};
 use crate::brdf::Lobe;
 use crate::fit::{Alignment, Fit, MAX_LOBES};
+use crate::sphere::legendre;
 use crate::units::SlopeVariance;
 use crate::words::UnknownWord;
 
@@ -176,6 +177,9 @@ pub enum Response {
     Short,
     /// The same, of the cosine to a normal as far from the mean as the direction is in the plane.
     Plane,
+    /// The lobe's zonal series, each order scaled by that of the lobe of normals (Han et al. 2007, equations
+    /// 13 to 19), to order [`SERIES_ORDER`].
+    Series,
     /// A Gaussian of the distance in the plane, whose variance is the sum of both (Tan et al. 2005, section
     /// 3, as printed).
     PlanarGaussian,
@@ -186,6 +190,7 @@ impl Response {
     pub(super) fn value(self, lobe: &dyn Lobe, by: SlopeVariance, (w, mean): (DVec3, DVec3)) -> f64 {
         match self {
             Self::Sphere | Self::Short => lobe.evaluate_widened(by, w.dot(mean)),
+            Self::Series => series(&lobe.zonal(SERIES_ORDER), by, w.dot(mean)),
             Self::Plane => lobe.evaluate_widened(by, planar_cosine(w, mean)),
             Self::PlanarGaussian => {
                 if w.z <= 0.0 {
@@ -197,6 +202,19 @@ impl Response {
             }
         }
     }
+}
+
+/// Order at which the zonal series of a lobe ends.
+pub const SERIES_ORDER: usize = 16;
+
+/// Sum of a lobe's zonal series, scaled by `Lambda_l = exp(-l² by/2)` of a lobe of normals, as printed for
+/// small angles; ringing below zero is clamped to zero.
+pub(super) fn series(rho: &[f64], by: SlopeVariance, u: f64) -> f64 {
+    let term = |(l, (rho, p)): (usize, (&f64, f64))| {
+        let (l, scale) = (l as f64, (2 * l + 1) as f64 / (4.0 * PI));
+        scale * (-0.5 * l * l * by.get()).exp() * rho * p
+    };
+    rho.iter().zip(legendre(rho.len() - 1, u.clamp(-1.0, 1.0))).enumerate().map(term).sum::<f64>().max(0.0)
 }
 
 /// Cosine `w · n` of a normal as far from `w` as the two are in the plane: the argument of the BRDF's own
@@ -249,6 +267,8 @@ pub(super) struct MixtureEvaluator<'a, L> {
     /// Decodes channels.
     pub(super) lobes: L,
     pub(super) response: Response,
+    /// Zonal coefficients of the lobe, for the series.
+    pub(super) rho: Vec<f64>,
     pub(super) lobe: &'a dyn Lobe,
     pub(super) directions: &'a [DVec3],
 }
@@ -282,6 +302,12 @@ where
             let cosine = match response {
                 Response::Sphere | Response::Short => |w: DVec3, mu: DVec3| w.dot(mu),
                 Response::Plane => planar_cosine,
+                Response::Series => {
+                    for (out, w) in out.iter_mut().zip(self.directions) {
+                        *out += weight * series(&self.rho, variance, w.dot(centre));
+                    }
+                    continue;
+                }
                 Response::PlanarGaussian => {
                     for (out, w) in out.iter_mut().zip(self.directions) {
                         *out += weight * response.value(self.lobe, variance, (*w, centre));

@@ -48,8 +48,7 @@ fn reflect_texel(
         let mu = direction(lobe);
         var specular = 0.0;
         if SPECULAR {
-            let widened = lobe_widen(brdf.base, lobe.variance + params.roughness);
-            let f = response(widened, directions.wh, lobe.mean);
+            let f = response(brdf, lobe, params.roughness, directions.wh);
             if f > 0.0 {
                 var n = mu;
                 if brdf.at_means == 0u {

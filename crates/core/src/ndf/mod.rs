@@ -41,7 +41,7 @@ pub use form::{Form, FormKind};
 pub use gmm::{GaussianMixture, Gmm};
 pub use leadr::SlopeGrid;
 pub use method::{AnyMethod, Describe, Evaluator, FlatLobe, Method, Representation, Sample};
-pub use mixture::{LobeSums, NormalLobe, Response};
+pub use mixture::{LobeSums, NormalLobe, Response, SERIES_ORDER};
 pub use naive::Naive;
 pub use ndm::{Ndm, NdmFactors, NdmKernel, NdmNormalisation};
 pub use phong::{Phong, PhongPeaks};
@@ -51,7 +51,7 @@ pub use slopes::{SlopeGaussian, SlopeMoments, Slopes};
 pub use stereographic::Stereographic;
 pub use table::{DEFAULT_METHOD, ParameterError, ParseMethodError, Row, TABLE};
 pub use toksvig::{MeanLobe, Toksvig};
-pub use vmf::{Vmf, VmfMixture};
+pub use vmf::{Vmf, VmfForm, VmfMixture};
 
 use glam::DVec3;
 

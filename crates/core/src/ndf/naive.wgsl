@@ -11,8 +11,8 @@ fn decode_lobe(channels: ptr<function, Channels>, layer: u32) -> NormalLobe {
 }
 
 // Response: the BRDF's lobe of the product with the mean, as if that were a normal.
-fn response(widened: f32, w: vec3<f32>, mu: vec3<f32>) -> f32 {
-    return lobe_evaluate(widened, dot(w, mu));
+fn response(brdf: Brdf, lobe: NormalLobe, roughness: f32, w: vec3<f32>) -> f32 {
+    return lobe_evaluate(lobe_widen(brdf.base, roughness), dot(w, lobe.mean));
 }
 
 // Mean that diffuse light takes the product with.

@@ -146,6 +146,6 @@ impl Representation for Phong {
 
     fn evaluator<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
         let lobes = |channels: &[f32]| Self::peaks(&self.unpack(channels));
-        Box::new(MixtureEvaluator { lobes, response: Response::Sphere, lobe, directions })
+        Box::new(MixtureEvaluator { lobes, response: Response::Sphere, rho: Vec::new(), lobe, directions })
     }
 }

@@ -9,6 +9,7 @@ use std::f64::consts::PI;
 
 use glam::{DMat2, DVec3};
 
+use super::mixture::{SERIES_ORDER, series};
 use super::{Form, NormalLobe, Representation, Response, leadr};
 use crate::brdf::{AnyLobe, Brdf, Directions, Lambert, SurfaceParams, Widen};
 use crate::units::SlopeVariance;
@@ -142,11 +143,15 @@ fn of_lobes(
         let params = (texel.params)(Some(lobe.index));
         let (mu, base) = (lobe.direction(), brdf.width(params.roughness));
         let widening = lobe.variance.widen(params.roughness);
+        // Where a roughness map differs from the roughness prepared for, the series is made anew.
+        let anew = response == Response::Series && params.roughness != texel.prepared.roughness;
+        let own = anew.then(|| brdf.lobe.widen(params.roughness).zonal(SERIES_ORDER));
+        let rho = own.as_deref().unwrap_or(&texel.prepared.table);
         for IncidentLight { directions, irradiance } in lights {
-            let f = if brdf.is_specular() {
-                response.value(&*brdf.lobe, widening, (directions.wh, lobe.mean))
-            } else {
-                0.0
+            let f = match response {
+                _ if !brdf.is_specular() => 0.0,
+                Response::Series => series(rho, lobe.variance, directions.wh.dot(lobe.mean)),
+                _ => response.value(&*brdf.lobe, widening, (directions.wh, lobe.mean)),
             };
             let specular = if f > 0.0 {
                 let n = if texel.at_means { mu } else { responding_normal(lobe, mu, base, directions.wh) };

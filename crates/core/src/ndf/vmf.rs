@@ -9,37 +9,56 @@
 //! Stored about the pole, `alpha (1 - r.z)` in place of `alpha r.z`: as linear, and in half floats `1 - |r|²`
 //! keeps its digits (`docs/methods.md` has what that gains). `vmf:J:origin` stores the paper's form;
 //! `vmf:J:printed` stores it and fits by EM as printed: an E-step without weights (Algorithm 1, line 5), and
-//! a prior that counts no normals (equation 23).
+//! a prior that counts no normals (equation 23). `vmf:J:series` is shaded by the lobe's zonal series, as
+//! equations 13 to 19 have it for any BRDF, in place of widening.
 
 use std::fmt::{self, Display};
 
 use glam::DVec3;
 
-use super::mixture::{LobeSums, MixtureEvaluator, NormalLobe, Response, effective, parse_mixture};
+use super::mixture::{
+    LobeSums, MixtureEvaluator, NormalLobe, Response, SERIES_ORDER, effective, parse_mixture,
+};
 use super::table::counted;
 use super::{
-    AnyMethod, Decoded, Describe, Encoding, Evaluator, Form, FormKind, ParameterError, Representation, Row,
-    Sample, StoredSums, mixture::spell,
+    AnyMethod, Decoded, Describe, Encoding, Evaluator, FlatLobe, Form, FormKind, ParameterError,
+    Representation, Row, Sample, StoredSums, mixture::spell,
 };
 use crate::brdf::Lobe;
 use crate::fit::{Alignment, Fit, LobeKind, MAX_LOBES, from_pole};
 use crate::shader::Shader;
 use crate::units::SlopeVariance;
+use crate::words;
 
 /// Von Mises-Fisher lobes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vmf {
     fit: Fit,
-    /// True when stored as the paper has it.
-    origin: bool,
+    form: VmfForm,
 }
+
+/// Form in which lobes are stored and shaded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum VmfForm {
+    /// Ours: about the pole, shaded by widening.
+    #[default]
+    Ours,
+    /// Stored about the origin, as the paper has it.
+    Origin,
+    /// Stored so, and fitted by EM as printed.
+    Printed,
+    /// Shaded by the lobe's zonal series.
+    Series,
+}
+
+words!(VmfForm { Ours => "ours", Origin => "origin", Printed => "printed", Series => "series" });
 
 pub(super) const ROW: Row = Row {
     name: "vmf",
     aliases: &[],
     parameters: ":J[:ALIGNMENT][:FORM]",
     summary: "J = 1..8 von Mises-Fisher lobes, aligned: refined (default), parent, prior[=C], matched or \
-              unaligned; form origin or printed",
+              unaligned; form origin, printed or series",
     paper: "Han et al. 2007, section 6; refined is ours",
     parse,
     samples: &[
@@ -50,6 +69,7 @@ pub(super) const ROW: Row = Row {
         "vmf:3:parent",
         "vmf:2:prior",
         "vmf:2:prior=0.5:printed",
+        "vmf:3:series",
         "vmf:3:matched",
         "vmf:4:unaligned",
     ],
@@ -57,10 +77,9 @@ pub(super) const ROW: Row = Row {
 
 fn parse(words: &[&str]) -> Result<AnyMethod, ParameterError> {
     let fit = |lobes| Vmf::new(lobes).map(|vmf| vmf.fit);
-    parse_mixture(words, fit, &["origin", "printed"]).map(|(fit, word)| {
-        let printed = word == Some("printed");
-        AnyMethod::from(Vmf { fit: Fit { printed, ..fit }, origin: word.is_some() })
-    })
+    let (fit, word) = parse_mixture(words, fit, &["origin", "printed", "series"])?;
+    let form = word.and_then(|word| word.parse().ok()).unwrap_or_default();
+    Ok(AnyMethod::from(Vmf { fit, form: VmfForm::Ours }.form(form)))
 }
 
 /// Shortest `|r|` that has a direction; below it a lobe is as wide as a lobe can be said to be.
@@ -73,7 +92,7 @@ impl Vmf {
     /// [`ParameterError::Count`] for another number.
     pub fn new(lobes: usize) -> Result<Self, ParameterError> {
         let lobes = counted(lobes, "number of lobes", 1..=MAX_LOBES, "vmf:4")?;
-        Ok(Self { fit: Fit::new(LobeKind::Spherical, lobes), origin: false })
+        Ok(Self { fit: Fit::new(LobeKind::Spherical, lobes), form: VmfForm::Ours })
     }
 
     /// Returns it with another way of making lobes of neighbours correspond.
@@ -83,21 +102,24 @@ impl Vmf {
         self
     }
 
-    /// Returns it stored about the origin, as the paper has it.
+    /// Returns it stored, fitted or shaded in another form.
     #[must_use]
-    pub fn about_origin(self) -> Self {
-        Self { origin: true, ..self }
+    pub fn form(self, form: VmfForm) -> Self {
+        Self { fit: Fit { printed: form == VmfForm::Printed, ..self.fit }, form }
     }
 
-    /// Returns it fitted and stored as the paper prints it.
-    #[must_use]
-    pub fn printed(self) -> Self {
-        Self { fit: Fit { printed: true, ..self.fit }, origin: true }
+    /// True when stored about the origin.
+    fn about_its_origin(&self) -> bool {
+        matches!(self.form, VmfForm::Origin | VmfForm::Printed)
+    }
+
+    fn response(&self) -> Response {
+        if self.form == VmfForm::Series { Response::Series } else { Response::Sphere }
     }
 
     /// From `alpha (1 - r.z)` to `alpha r.z`, where asked; and back, since both are `alpha` less the other.
     fn turned(&self, &[alpha, x, y, w]: &[f32; 4]) -> [f32; 4] {
-        [alpha, x, y, if self.origin { alpha - w } else { w }]
+        [alpha, x, y, if self.about_its_origin() { alpha - w } else { w }]
     }
 
     /// The lobes that the sums decode to, dead ones left out.
@@ -132,14 +154,14 @@ impl From<VmfMixture> for Decoded {
 
 impl Display for Vmf {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let word = if self.fit.printed { "printed" } else { "origin" };
-        f.write_str(&spell(ROW.name, &self.fit, self.origin.then_some(word)))
+        let word = (self.form != VmfForm::Ours).then(|| self.form.name());
+        f.write_str(&spell(ROW.name, &self.fit, word))
     }
 }
 
 impl Describe for Vmf {
     fn encoding(&self) -> Encoding {
-        let sums = if self.origin { StoredSums::Plain } else { StoredSums::AboutPole };
+        let sums = if self.about_its_origin() { StoredSums::Plain } else { StoredSums::AboutPole };
         Encoding::Lobes { kind: self.fit.kind, count: self.fit.lobes, sums }
     }
 
@@ -148,8 +170,19 @@ impl Describe for Vmf {
     }
 
     fn shader(&self) -> Shader {
-        Shader::new(FormKind::Lobes, &[include_str!("vmf.wgsl"), include_str!("sphere_response.wgsl")])
-            .constant("ORIGIN", self.origin)
+        let shader = if self.form == VmfForm::Series {
+            let sources = &[include_str!("vmf.wgsl"), include_str!("series_response.wgsl")];
+            Shader::new(FormKind::Lobes, sources).table(SERIES_ORDER + 1)
+        } else {
+            Shader::new(FormKind::Lobes, &[include_str!("vmf.wgsl"), include_str!("sphere_response.wgsl")])
+        };
+        shader.constant("ORIGIN", self.about_its_origin())
+    }
+
+    fn flat_lobe(&self, brdf: &dyn Lobe) -> FlatLobe {
+        // Diffuse light is no series: its lobe widens in closed form.
+        let series = self.form == VmfForm::Series && brdf.slope_variance().is_some();
+        if series { FlatLobe::BandLimited(SERIES_ORDER) } else { FlatLobe::Exact }
     }
 
     fn fit(&self) -> Option<Fit> {
@@ -195,15 +228,26 @@ impl Representation for Vmf {
     }
 
     fn form<'a>(&'a self, lobes: &VmfMixture) -> Form<'a> {
-        Form::Lobes(lobes.lobes.clone(), Response::Sphere)
+        Form::Lobes(lobes.lobes.clone(), self.response())
     }
 
     fn effective<'a>(&'a self, lobes: &VmfMixture, lobe: &'a dyn Lobe) -> Box<dyn Fn(DVec3) -> f64 + 'a> {
-        effective(&lobes.lobes, lobe, Response::Sphere)
+        effective(&lobes.lobes, lobe, self.response())
+    }
+
+    /// The lobe's zonal coefficients, for the series.
+    fn table(&self, lobe: &dyn Lobe) -> Vec<f64> {
+        if self.form == VmfForm::Series { lobe.zonal(SERIES_ORDER) } else { Vec::new() }
     }
 
     fn evaluator<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
         let lobes = |channels: &[f32]| Self::lobes(&self.unpack(channels));
-        Box::new(MixtureEvaluator { lobes, response: Response::Sphere, lobe, directions })
+        Box::new(MixtureEvaluator {
+            lobes,
+            response: self.response(),
+            rho: self.table(lobe),
+            lobe,
+            directions,
+        })
     }
 }

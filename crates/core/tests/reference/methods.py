@@ -5,6 +5,7 @@ exponents 50 and 400 and Lambert. Each method's stored channels are worked out h
 formulas, and so is what it makes of them; nothing is fitted.
 """
 
+import functools
 import json
 import sys
 
@@ -45,7 +46,14 @@ def groups(normals):
     return np.array_split(np.argsort(angle), LOBES)
 
 
-def vmf(normals):
+@functools.cache
+def zonal(f, l):
+    """Zonal coefficient of a lobe, by adaptive quadrature."""
+    integrand = lambda t: f(0, np.cos(t)) * eval_legendre(l, np.cos(t)) * np.sin(t)
+    return 2 * np.pi * quad(integrand, 0, np.pi / 2, points=[0.05, 0.2, 0.5], limit=400, epsabs=1e-13)[0]
+
+
+def vmf(normals, series=False):
     channels = [[len(g) / len(normals), *(normals[g].mean(0) * [1, 1, 0] * len(g) / len(normals))[:2],
                  (1 - normals[g][:, 2]).mean() * len(g) / len(normals)] for g in groups(normals)]
     channels = float32(channels)
@@ -57,7 +65,13 @@ def vmf(normals):
             length = np.linalg.norm(r)
             # Banerjee et al. 2005; then Han et al.'s equation 20 for Blinn-Phong.
             kappa = (3 * length - length**3) / (1 - length**2)
-            total = total + a / channels[:, 0].sum() * f(1 / kappa, w @ (r / length))
+            u = w @ (r / length)
+            value = f(1 / kappa, u)
+            if series and f is not lambert_lobe:
+                # Han et al.'s zonal series of any BRDF, Lambda_l as printed for small angles.
+                scale = [(2 * l + 1) / (4 * np.pi) * np.exp(-l * l / (2 * kappa)) * zonal(f, l) for l in range(17)]
+                value = np.maximum(sum(s * eval_legendre(l, u) for l, s in enumerate(scale)), 0)
+            total = total + a / channels[:, 0].sum() * value
         return total
 
     return channels, lobe
@@ -109,11 +123,7 @@ def sh(normals):
     channels = float32(real_harmonics(ORDER, normals).mean(0))
 
     def lobe(f, w):
-        def zonal(l):
-            integrand = lambda t: f(0, np.cos(t)) * eval_legendre(l, np.cos(t)) * np.sin(t)
-            return 2 * np.pi * quad(integrand, 0, np.pi / 2, points=[0.05, 0.2, 0.5], limit=400, epsabs=1e-13)[0]
-
-        rho = np.concatenate([[zonal(l)] * (2 * l + 1) for l in range(ORDER + 1)])
+        rho = np.concatenate([[zonal(f, l)] * (2 * l + 1) for l in range(ORDER + 1)])
         return np.maximum(real_harmonics(ORDER, w) @ (rho * channels), 0)
 
     return channels, lobe
@@ -239,6 +249,7 @@ def lambert_lobe(by, u):
 
 METHODS = {
     "vmf:3": vmf,
+    "vmf:3:series": lambda n: vmf(n, series=True),
     "gmm:3": gmm,
     "gmm:3:printed": lambda n: gmm(n, printed=True),
     "phong:3": phong,
