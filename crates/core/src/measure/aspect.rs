@@ -89,6 +89,14 @@ pub(super) enum Reflectance {
     Factored,
 }
 
+/// Places that values are added to: the first aspect's begin at `first`, and each other's `stride` further
+/// on.
+pub(super) struct Places<'a> {
+    pub(super) out: &'a mut [f64],
+    pub(super) first: usize,
+    pub(super) stride: usize,
+}
+
 impl<'a> Aspects<'a> {
     pub(super) fn new(lobe: &'a dyn Lobe) -> Self {
         match lobe.measured().filter(|m| m.is_itself()) {
@@ -112,16 +120,9 @@ impl<'a> Aspects<'a> {
         }
     }
 
-    /// Adds `weight` times the values at these cosines, which are lost; aspects lie `stride` apart, and the
-    /// first value at `first`.
-    pub(super) fn add(
-        &self,
-        reflectance: Reflectance,
-        cosines: &mut [f64],
-        weight: f64,
-        out: (&mut [f64], usize, usize),
-    ) {
-        let (out, first, stride) = out;
+    /// Adds `weight` times the values at these cosines, which are lost.
+    pub(super) fn add(&self, reflectance: Reflectance, cosines: &mut [f64], weight: f64, to: Places<'_>) {
+        let Places { out, first, stride } = to;
         match self {
             Self::Lobe(lobe) => {
                 lobe.evaluate_all(cosines);
@@ -210,7 +211,7 @@ mod tests {
         for u in [0.9999_f64, 0.99, 0.9, 0.5] {
             let of = |reflectance| {
                 let mut out = [0.0; 9];
-                all.add(reflectance, &mut [u], 1.0, (&mut out, 0, 1));
+                all.add(reflectance, &mut [u], 1.0, Places { out: &mut out, first: 0, stride: 1 });
                 out
             };
             let (truth, shown) = (of(Reflectance::True), of(Reflectance::Factored));

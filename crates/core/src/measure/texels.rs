@@ -10,7 +10,7 @@ use std::ops::RangeInclusive;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::aspect::{AspectEvaluator, Aspects, Reflectance};
+use super::aspect::{AspectEvaluator, Aspects, Places, Reflectance};
 use super::estimate::{Draws, Estimate, Sampled, Squares};
 use crate::brdf::Lobe;
 use crate::grid::Size;
@@ -141,7 +141,8 @@ impl<'a> TexelTruth<'a> {
             for (u, w) in scratch.iter_mut().zip(&row[first..last]) {
                 *u = w.dot(n);
             }
-            self.aspects.add(by, scratch, weight, (out, range.start + first, self.lattice.len()));
+            let to = Places { out, first: range.start + first, stride: self.lattice.len() };
+            self.aspects.add(by, scratch, weight, to);
         }
     }
 

@@ -2,8 +2,8 @@
 //! then f into kernels and g into a polynomial over a cosine.
 //!
 //! Both steps are least squares, none of the factors negative, in the measure that [`Residual`] prints: by
-//! solid angle, and by both cosines, which is what a pair of directions exchanges. Channels share nothing:
-//! where a material's peak is as high as chrome's, one f for all leaves four times what three leave.
+//! solid angle, and by both cosines, which is what a pair of directions exchanges. Channels share nothing: of
+//! chrome one f for all leaves 12 %, and three leave 2 %.
 
 use glam::DVec3;
 
