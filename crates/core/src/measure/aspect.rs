@@ -160,7 +160,7 @@ fn reach(lobe: &dyn Lobe) -> f64 {
 
 /// Effective lobes of a method's texels, in every aspect, one after the other.
 pub(super) struct AspectEvaluator<'a> {
-    /// One for each lobe that is shown.
+    /// Evaluator of each lobe that is shown.
     evaluators: Vec<Box<dyn Evaluator + 'a>>,
     /// Of each aspect, its lobe and scale.
     shown: Vec<(usize, f64)>,

@@ -26,6 +26,9 @@ pub const DISK_RADIUS: f64 = 0.97;
 /// Most texels of a level that are all measured without drawing some first.
 pub const MAX_TEXELS: usize = 512;
 
+/// Most values of the true lobes of a level that are kept at once, half a gigabyte.
+const MOST_VALUES: usize = 1 << 26;
+
 /// Texels drawn at a time from a level that has more than [`MAX_TEXELS`].
 pub const SAMPLED_TEXELS: usize = 256;
 
@@ -180,8 +183,15 @@ struct TrueLevel {
     level: usize,
     /// Texels, row by row.
     texels: Vec<(usize, usize)>,
-    /// The true effective lobe of each, at every direction of the lattice.
-    lobes: Vec<Vec<f64>>,
+    lobes: Lobes,
+}
+
+/// Lobes of some texels, at every direction of the lattice.
+struct Lobes {
+    /// The true effective lobe of each.
+    true_ones: Vec<Vec<f64>>,
+    /// That by the factors of a measured material; empty for other lobes.
+    factored: Vec<Vec<f64>>,
 }
 
 /// Map to be measured.
@@ -215,11 +225,32 @@ impl TexelTruth<'_> {
         });
         let lobes = match nested {
             Some(finer) => {
-                texels.par_iter().map(|t| mean_of_nested(finer, sizes[finer.level], size, *t)).collect()
+                let means = |lobes: &[Vec<f64>]| -> Vec<Vec<f64>> {
+                    let of = |t: &(usize, usize)| mean_of_nested(lobes, sizes[finer.level], size, *t);
+                    if lobes.is_empty() { Vec::new() } else { texels.par_iter().map(of).collect() }
+                };
+                let Lobes { true_ones, factored } = &finer.lobes;
+                Lobes { true_ones: means(true_ones), factored: means(factored) }
             }
-            None => self.texels(size, &texels, observer)?,
+            None => self.lobes(size, &texels, observer)?,
         };
         Ok(TrueLevel { level, texels, lobes })
+    }
+
+    /// Lobes of some texels of a level.
+    fn lobes(
+        &self,
+        size: Size,
+        texels: &[(usize, usize)],
+        observer: &dyn Observer,
+    ) -> Result<Lobes, Cancelled> {
+        let factored = |(x, y): &(usize, usize)| {
+            observer.check()?;
+            Ok(self.factored_texel(size, *x, *y))
+        };
+        let factored: Result<_, Cancelled> =
+            if self.is_measured() { texels.par_iter().map(factored).collect() } else { Ok(Vec::new()) };
+        Ok(Lobes { true_ones: self.texels(size, texels, observer)?, factored: factored? })
     }
 
     /// True lobes of some texels of a level.
@@ -283,8 +314,8 @@ pub fn level_errors(
     let mut finer: Option<TrueLevel> = None;
     for (level, size) in sizes.iter().enumerate() {
         let mut drawn = Sampled::new(figures);
-        // All lobes of a level are kept: of as many aspects, fewer.
-        if size.area() > MAX_TEXELS / truth.aspects.count() {
+        // All lobes of a level are kept, twice for a measured material: of many values each, fewer.
+        if size.area() > MAX_TEXELS.min(MOST_VALUES / truth.values()) {
             let draws = truth.draws(*size);
             while !drawn.is_enough(MOST_SAMPLED.min(size.area())) {
                 let places = draws.draw(SAMPLED_TEXELS, level, drawn.batches);
@@ -325,7 +356,7 @@ fn measured(
     texels: &[(usize, usize)],
     observer: &dyn Observer,
 ) -> Result<Vec<Vec<Squares>>, Cancelled> {
-    let lobes = truth.texels(level_sizes(truth.size)[level], texels, observer)?;
+    let lobes = truth.lobes(level_sizes(truth.size)[level], texels, observer)?;
     Ok(all_squares(truth, maps, (level, texels), &lobes))
 }
 
@@ -334,17 +365,16 @@ fn all_squares(
     truth: &TexelTruth<'_>,
     maps: &[BakedMap<'_>],
     (level, texels): (usize, &[(usize, usize)]),
-    lobes: &[Vec<f64>],
+    Lobes { true_ones, factored }: &Lobes,
 ) -> Vec<Vec<Squares>> {
-    let mut all: Vec<_> = maps.iter().map(|map| squares(truth, map, level, texels, lobes)).collect();
+    let mut all: Vec<_> = maps.iter().map(|map| squares(truth, map, level, texels, true_ones)).collect();
     if truth.is_measured() {
-        let size = level_sizes(truth.size)[level];
-        let of = |((x, y), lobe): (&(usize, usize), &Vec<f64>)| {
+        let of = |(factored, lobe): (&Vec<f64>, &Vec<f64>)| {
             let mut sums = Squares::default();
-            sums.add(&truth.factored_texel(size, *x, *y), lobe);
+            sums.add(factored, lobe);
             sums
         };
-        all.push(texels.par_iter().zip(lobes).map(of).collect());
+        all.push(factored.iter().zip(true_ones).map(of).collect());
     }
     all
 }
@@ -368,12 +398,12 @@ fn squares(
     texels.par_iter().zip(lobes).map(of).collect()
 }
 
-fn mean_of_nested(finer: &TrueLevel, fine: Size, coarse: Size, (x, y): (usize, usize)) -> Vec<f64> {
+fn mean_of_nested(lobes: &[Vec<f64>], fine: Size, coarse: Size, (x, y): (usize, usize)) -> Vec<f64> {
     let (columns, rows) = (fine.width / coarse.width, fine.height / coarse.height);
-    let mut mean = vec![0.0; finer.lobes[0].len()];
+    let mut mean = vec![0.0; lobes[0].len()];
     for j in y * rows..(y + 1) * rows {
         for i in x * columns..(x + 1) * columns {
-            let child = &finer.lobes[j * fine.width + i];
+            let child = &lobes[j * fine.width + i];
             mean.iter_mut().zip(child).for_each(|(sum, f)| *sum += f / (columns * rows) as f64);
         }
     }
@@ -438,7 +468,7 @@ mod tests {
             let size = Size::new(32 >> level, 32 >> level).unwrap();
             let (direct, nested) =
                 (truth.texel(size, 0, 0), truth.level(level, Some(&finer), &|_| ()).unwrap());
-            assert!(direct.iter().zip(&nested.lobes[0]).all(|(a, b)| (a - b).abs() < 1e-12));
+            assert!(direct.iter().zip(&nested.lobes.true_ones[0]).all(|(a, b)| (a - b).abs() < 1e-12));
         }
     }
 }

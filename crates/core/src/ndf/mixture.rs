@@ -173,9 +173,9 @@ pub(super) fn spell(name: &str, fit: &Fit, word: Option<&str>) -> String {
 pub enum Response {
     /// The BRDF's lobe, widened, of the cosine to the mean.
     Sphere,
-    /// The same of a mean that is shorter than one, as if it were a normal; diffuse light too.
+    /// That lobe, of the product with a mean shorter than one, as if it were a normal; diffuse light too.
     Short,
-    /// The same, of the cosine to a normal as far from the mean as the direction is in the plane.
+    /// That lobe, of the cosine to a normal as far from the mean as the direction is in the plane.
     Plane,
     /// The lobe's zonal series, each order scaled by that of the lobe of normals (Han et al. 2007, equations
     /// 13 to 19), to order [`SERIES_ORDER`].
