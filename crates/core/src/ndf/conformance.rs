@@ -404,7 +404,7 @@ fn effective_lobes_keep_their_energy() {
                 // Factors are interpolated between three roughnesses: 0.0021.
                 Some("ndm") => 0.0025,
                 Some("vmf") if name.ends_with(":series") => 0.011,
-                // Single floats: 2e-5 measured.
+                // Single floats, magnified by the exponent.
                 _ => 1e-4,
             };
             assert!((total - 1.0).abs() < bound, "{spelling} {name} {total}");

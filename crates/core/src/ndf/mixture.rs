@@ -236,7 +236,7 @@ struct Answers {
     lobes: Vec<(f64, DVec3, SlopeVariance)>,
 }
 
-/// How lobes answer. Diffuse light is no narrow lobe in the half-vector: it takes the cosine to the mean
+/// Answers of lobes. Diffuse light is no narrow lobe in the half-vector: it takes the cosine to the mean
 /// itself, on the sphere (Tan et al. 2005, section 4.1: `[mu · l]`, and as printed nothing widens it).
 fn answers(lobes: &[NormalLobe], lobe: &dyn Lobe, response: Response) -> Answers {
     let diffuse = lobe.slope_variance().is_none();

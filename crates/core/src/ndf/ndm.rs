@@ -54,7 +54,7 @@ pub enum NdmNormalisation {
     Integrated,
     /// Replaced by the 2-D Gaussian on the plane through the mean, projected to the sphere.
     Plane,
-    /// The same on the plane that touches the sphere at the mean's direction.
+    /// That Gaussian on the plane that touches the sphere at the mean's direction.
     Tangent,
 }
 
@@ -78,7 +78,7 @@ pub struct Ndm {
     gloss: Option<u32>,
 }
 
-/// What the factors in a stored map are.
+/// Density whose factors a stored map holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NdmFactors {
     kernel: NdmKernel,

@@ -1,7 +1,7 @@
 //! `stereographic`: a Gaussian on the plane, projected to the full sphere from the pole below. Olano and
 //! North 1997, section 4.
 //!
-//! One of the first densities that they tried, `n([x y]/(z + 1), mu, Σ)`, and gave up: "quite difficult to
+//! Density that they tried among the first, `n([x y]/(z + 1), mu, Σ)`, and gave up: "quite difficult to
 //! combine and filter". It is here to show that. Mean and second moments of `s = n.xy/(1 + n.z)` are stored,
 //! which mix; the Gaussian of these moments is what a mixture is approximated by. The base lobe, of slope
 //! variance v, is one of variance v/4 there: near the pole `s` is half a slope. Beside them lies the mean
