@@ -4,7 +4,7 @@
 //! - [`maps`] reads sources and baked maps; [`BakeJob`] bakes one into the other, and [`choose`] finds the
 //!   method for a map.
 //! - [`compare`] measures methods on a map, [`render`] renders scenes through baked maps and by brute force,
-//!   [`report`] draws both.
+//!   [`report`] shows both, by the sheets and plots of [`draw`].
 //! - [`core`] has the mathematics, [`trace`] the CPU renderer, and `gpu` (a feature) the same in real time,
 //!   and shaders for other programs.
 //!
@@ -33,6 +33,7 @@ mod bake;
 pub mod choose;
 pub mod compare;
 mod device;
+pub mod draw;
 mod error;
 pub mod inspect;
 pub mod render;

@@ -53,6 +53,9 @@ pub struct Frame {
     pub results: Vec<MethodResult>,
     /// Picture of the truth, where there is one, then of each method; empty when they are not kept.
     pub pictures: Vec<Picture>,
+    /// Pictures of the drift, of the truth and of each method, where sparkle is measured; empty when they are
+    /// not kept.
+    pub drifts: Vec<Vec<Picture>>,
 }
 
 /// Report on a frame's truth.
@@ -217,6 +220,7 @@ fn render_on<E: Engine>(
         each(at, &frame)?;
         if !job.keep {
             frame.pictures = Vec::new();
+            frame.drifts = Vec::new();
         }
         frames.push(frame);
     }
@@ -254,13 +258,15 @@ impl<E: Engine> Shot<'_, E> {
         }
         let seconds = start.elapsed().as_secs_f64();
         // A drifting truth is rendered in one go, which only the CPU renderer can do.
-        let drift = |effort: Effort| -> Result<DriftReport, Error> {
+        let drift = |effort: Effort| -> Result<(DriftReport, Vec<Picture>), Error> {
             observer.begin("truth, drifting");
             let geometry = TrueGeometry::new(scene, observer);
             let truth = geometry.truth(scene);
-            Ok(true_change(&truth.drift(&scene.camera, size, effort.rays, observer)?, exposure))
+            let halves = truth.drift(&scene.camera, size, effort.rays, observer)?;
+            Ok((true_change(&halves, exposure), mixed(&halves, 1.0)))
         };
-        let drifting = job.truth.filter(|_| job.sparkle).map(drift).transpose()?;
+        let (drifting, true_drift) = job.truth.filter(|_| job.sparkle).map(drift).transpose()?.unzip();
+        let mut drifts: Vec<Vec<Picture>> = true_drift.filter(|_| job.keep).into_iter().collect();
         let result = |maps: &E::Maps| -> Result<(MethodResult, Picture), Error> {
             observer.begin("filtered");
             // Every picture of a drift is a part of the same work.
@@ -273,13 +279,15 @@ impl<E: Engine> Shot<'_, E> {
                 drawn
             };
             let RenderedPicture { picture, milliseconds } = draw(&view, 0)?;
-            let sparkle = |drifting: DriftReport| -> Result<f64, Error> {
+            let mut sparkle = |drifting: DriftReport| -> Result<f64, Error> {
                 let moved =
                     |i| draw(&View { camera: drifted(&scene.camera, i), ..view }, 1 + i).map(|d| d.picture);
                 let pictures = (0..DRIFT_FRAMES).map(moved).collect::<Result<Vec<Picture>, _>>()?;
-                Ok(change(&pictures, exposure) / drifting.change.max(f64::MIN_POSITIVE))
+                let sparkle = change(&pictures, exposure) / drifting.change.max(f64::MIN_POSITIVE);
+                drifts.extend(job.keep.then_some(pictures));
+                Ok(sparkle)
             };
-            let sparkle = drifting.map(sparkle).transpose()?;
+            let sparkle = drifting.map(&mut sparkle).transpose()?;
             let errors = truth.as_ref().map(|truth| PictureErrors {
                 relative_l2: relative_l2(&picture, &truth.picture),
                 color_error: color_error(&picture, &truth.picture, exposure),
@@ -293,7 +301,7 @@ impl<E: Engine> Shot<'_, E> {
         let (results, drawn): (Vec<MethodResult>, Vec<Picture>) = results.into_iter().unzip();
         let said = truth.as_ref().map(|t| FrameTruth { rays: t.rays, noise: t.noise, seconds });
         let pictures = truth.map(|t| t.picture).into_iter().chain(drawn).collect();
-        Ok(Frame { time, exposure, truth: said, drifting, results, pictures })
+        Ok(Frame { time, exposure, truth: said, drifting, results, pictures, drifts })
     }
 }
 
@@ -306,15 +314,17 @@ pub struct DriftReport {
     pub noise: f64,
 }
 
-fn true_change([a, b]: &[Vec<Picture>; 2], exposure: f32) -> DriftReport {
-    let with = |weight: f32| -> Vec<Picture> {
-        let mean = |(a, b): (&Picture, &Picture)| {
-            Picture::from_fn(a.size(), |x, y| (a.row(y)[x] + weight * b.row(y)[x]) * 0.5)
-        };
-        a.iter().zip(b).map(mean).collect()
+/// Half the sum of two halves of a drift's pictures, the second times a weight.
+fn mixed([a, b]: &[Vec<Picture>; 2], weight: f32) -> Vec<Picture> {
+    let mean = |(a, b): (&Picture, &Picture)| {
+        Picture::from_fn(a.size(), |x, y| (a.row(y)[x] + weight * b.row(y)[x]) * 0.5)
     };
+    a.iter().zip(b).map(mean).collect()
+}
+
+fn true_change(halves: &[Vec<Picture>; 2], exposure: f32) -> DriftReport {
     // Noise alone: the change of half the difference, on top of a picture that stands still.
-    let (still, half) = (with(1.0), with(-1.0));
+    let (still, half) = (mixed(halves, 1.0), mixed(halves, -1.0));
     let noisy: Vec<Picture> =
         half.iter().map(|d| Picture::from_fn(d.size(), |x, y| still[0].row(y)[x] + d.row(y)[x])).collect();
     DriftReport { change: change(&still, exposure), noise: change(&noisy, exposure) }

@@ -11,6 +11,7 @@ use ndfmap::core::lookup::Lookups;
 use ndfmap::core::ndf::{AnyMethod, Slopes, Vmf};
 use ndfmap::core::observe::{Observer, Unobserved};
 use ndfmap::core::pyramid::Precision;
+use ndfmap::draw::Theme;
 use ndfmap::maps::attribute::AttributeMap;
 use ndfmap::maps::source::{SourceMap, SourceOptions, read_source};
 use ndfmap::maps::{Attribute, ChannelLayout, NdfMap, WriteOptions};
@@ -118,7 +119,7 @@ fn every_piece_of_a_rendering_runs_forwards_to_its_end_and_can_be_stopped() {
         assert!(told.is_sorted() && told.last() == Some(&1.0), "{name}: {told:?}");
     }
     // A report whose pictures were not kept has no contact sheet, and says so.
-    assert!(matches!(contact_sheet(&report, "disk"), Err(Error::Request(_))));
+    assert!(matches!(contact_sheet(&report, "disk", Theme::Light), Err(Error::Request(_))));
     for patience in 0..4 {
         let stopped = render(&job(&scene, &methods), &Device::Cpu, &diary(patience), &mut |_, _| Ok(()));
         assert!(matches!(stopped, Err(Error::Cancelled(_))), "{patience}");
@@ -167,4 +168,24 @@ fn errors_say_how_sure_they_are() {
     assert!(!serde_json::to_string(&comparison).unwrap().contains("null"));
     let refused = compared("ggx:0.003").unwrap_err();
     assert!(matches!(&refused, Error::Request(said) if said.contains("too narrow")), "{refused}");
+}
+
+#[test]
+fn every_frame_of_a_scene_differs() {
+    for row in ndfmap::scene::TABLE {
+        let scene = SceneSpec {
+            scene: row.name.to_owned(),
+            map_size: Some(Size { width: 32, height: 32 }),
+            ..SceneSpec::default()
+        };
+        let methods = ["naive".parse().unwrap()];
+        let times = [0.0, 0.25, 0.5, 0.75, 1.0];
+        let job =
+            RenderJob { times: &times, truth: None, sparkle: false, keep: true, ..job(&scene, &methods) };
+        let report = render(&job, &Device::Cpu, &Unobserved, &mut |_, _| Ok(())).unwrap();
+        for (at, frame) in report.frames.iter().enumerate() {
+            let same = report.frames[..at].iter().find(|f| f.pictures == frame.pictures);
+            assert!(same.is_none(), "{}: frame {at} is another once more", row.name);
+        }
+    }
 }

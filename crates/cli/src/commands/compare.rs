@@ -23,7 +23,7 @@ use super::arguments::{
     method_spelling, methods_help, read_brdf, scene_name, size,
 };
 use super::render::{DisplaceArguments, FilterArguments, check_drift};
-use super::{check_kept, make_folder, make_way, print, print_json, say_written, to_value};
+use super::{check_kept, circumstances, make_folder, make_way, print, print_json, say_written, to_value};
 use crate::tables;
 use crate::terminal::Terminal;
 use crate::voice::warn;
@@ -233,6 +233,7 @@ impl Run<'_> {
                 pictures: pictures.as_ref(),
                 source: &self.map.source,
                 warnings: &self.map.warnings,
+                circumstances: &circumstances(),
             };
             for ReportFile { name, bytes } in report::draw(&pages)? {
                 let path = folder.join(name);

@@ -8,6 +8,7 @@ use ndfmap::core::grid::Size;
 use ndfmap::core::lookup::{Filtering, Lookups};
 use ndfmap::core::ndf::{AnyMethod, DEFAULT_METHOD};
 use ndfmap::core::pyramid::Precision;
+use ndfmap::draw::Theme;
 use ndfmap::maps::source::{SourceOptions, read_source};
 use ndfmap::maps::{WriteOptions, atomic};
 use ndfmap::render::{Device, RenderJob, render};
@@ -57,7 +58,7 @@ fn sheet(scene: &str, times: &[f64], terminal: &Terminal) -> Result<Vec<u8>, Err
         sparkle: false,
         keep: true,
     };
-    contact_sheet(&render(&job, &Device::Cpu, terminal, &mut |_, _| Ok(()))?, scene)
+    contact_sheet(&render(&job, &Device::Cpu, terminal, &mut |_, _| Ok(()))?, scene, Theme::Light)
 }
 
 impl Demo {

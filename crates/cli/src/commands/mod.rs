@@ -182,6 +182,16 @@ fn check_apart<'a>(outputs: impl IntoIterator<Item = &'a PathBuf>) -> Result<(),
     Ok(())
 }
 
+/// Circumstances of a report: the command, when and where it ran. Paths stand in it as they were given.
+fn circumstances() -> Vec<String> {
+    let arguments = std::env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned());
+    let command = std::iter::once("ndfmap".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ");
+    let date = humantime::format_rfc3339_seconds(std::time::SystemTime::now());
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let (system, processor) = (std::env::consts::OS, std::env::consts::ARCH);
+    vec![command, format!("{date}, {system} on {processor}, {cores} cores")]
+}
+
 /// Makes a folder for outputs.
 fn make_folder(folder: &Path) -> Result<(), Error> {
     if folder.is_file() {

@@ -12,6 +12,7 @@ use ndfmap::core::light::Light;
 use ndfmap::core::lookup::{Filtering, Lookups, Sampling};
 use ndfmap::core::ndf::{AnyMethod, DEFAULT_METHOD};
 use ndfmap::core::observe::Observer;
+use ndfmap::draw::Theme;
 use ndfmap::maps::atomic;
 use ndfmap::maps::formats::{WritePicture, picture_writer};
 use ndfmap::maps::formats::{read_file, read_ndf};
@@ -70,6 +71,9 @@ pub(super) struct Render {
     /// Write a contact sheet: truth, each method, differences and errors
     #[arg(long, value_name = "SHEET.png")]
     compare: Option<PathBuf>,
+    /// Draw the contact sheet on dark paper
+    #[arg(long, requires = "compare")]
+    dark: bool,
     /// Also measure how each method sparkles as the camera drifts by a pixel; 17 more pictures each
     #[arg(long, requires = "truth")]
     sparkle: bool,
@@ -392,9 +396,10 @@ impl Render {
         let write = &mut |at, frame: &Frame| self.write(at, times.len(), frame, &mut written);
         let report = self.render(&job, &terminal, write)?;
         if let Some(sheet) = &self.compare {
-            let title = format!("{}  {} x {}", self.scene, self.size.width, self.size.height);
+            let theme = if self.dark { Theme::Dark } else { Theme::Light };
+            let title = format!("{}, {} × {}", self.scene, self.size.width, self.size.height);
             make_way(sheet)?;
-            atomic::write(sheet, &contact_sheet(&report, &title)?)?;
+            atomic::write(sheet, &contact_sheet(&report, &title, theme)?)?;
             written.push(sheet.clone());
         }
         say_written(&written);

@@ -4,18 +4,16 @@
 
 use glam::DVec2;
 use ndfmap_core::bake::Bake;
-use ndfmap_core::brdf::AnyLobe;
 use ndfmap_core::fit::{Alignment, LobeKind};
 use ndfmap_core::lookup::{Tap, Texels};
 use ndfmap_core::measure::{TexelTruth, evaluate_neighbours};
 use ndfmap_core::ndf::{AnyMethod, Gmm, Method, Vmf};
-use ndfmap_core::observe::Cancelled;
 use ndfmap_core::pyramid::Pyramid;
-use ndfmap_core::sphere::DiskLattice;
 
-use super::canvas::{Canvas, LETTER, LINE};
-use super::disks::{PEN, SCALE, SIDE, busiest, plot};
+use super::disks::{SCALE, SIDE, busiest, pen};
+use crate::Error;
 use crate::compare::{Comparison, Row, Subject};
+use crate::draw::{Disk, Panel, Sheet, SheetRow};
 
 /// Level drawn, where the map has it.
 const LEVEL: usize = 4;
@@ -23,34 +21,31 @@ const LEVEL: usize = 4;
 /// Titles of the columns.
 const COLUMNS: [&str; 4] = ["histogram", "unaligned", "as baked", "each texel shaded"];
 
-/// Draws a row for every mixture that was compared; `None` without a mixture, or without a corner to look at.
-pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Result<Option<Canvas>, Cancelled> {
+/// Sheet with a row for every mixture that was compared: a corner between four texels, by the histogram of its
+/// normals, by lobes that were fitted apart, by those of the comparison, and texel by texel. `None` without a
+/// mixture, or without a corner to look at.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub fn corner_sheet(subject: &Subject<'_>, comparison: &Comparison) -> Result<Option<Sheet>, Error> {
     let rows: Vec<Mixture<'_>> = comparison.rows.iter().filter_map(mixture).collect();
     let sizes = &comparison.sizes;
     let level = (0..sizes.len()).rev().find(|l| *l <= LEVEL && sizes[*l].area() > 1);
     let Some(level) = level.filter(|_| !rows.is_empty()) else { return Ok(None) };
     let size = sizes[level];
-    let pen = PEN.parse::<AnyLobe>().unwrap_or_else(|e| unreachable!("the pen is a constant: {e}"));
-    let lattice = DiskLattice::new(SIDE, 0.99);
-    let truth = TexelTruth::new(subject.surface, &*pen, &lattice);
+    let (pen, disk) = (pen(), Disk::new(SIDE, SCALE));
+    let lattice = &disk.lattice;
+    let truth = TexelTruth::new(subject.surface, &*pen, lattice);
     let (x, y) = busiest(subject, size)?;
     let place = DVec2::new((x + 1) as f64 / size.width as f64, (y + 1) as f64 / size.height as f64);
-    let disk = SIDE * SCALE;
-    let (label, step_x, step_y) = (20 * LETTER, disk.max(18 * LETTER) + 8, disk + LINE);
-    let mut canvas = Canvas::new(label + COLUMNS.len() * step_x, 2 * LINE + rows.len() * step_y);
-    for (column, title) in COLUMNS.iter().enumerate() {
-        canvas.text(label + column * step_x, 8, title);
-    }
     let mut histogram = vec![0.0; lattice.len()];
     for n in rows[0].row.pyramid.neighbours(Tap { uv: place, lod: level as f64 }) {
         let lobe = truth.texel(size, n.x, n.y);
         histogram.iter_mut().zip(lobe).for_each(|(sum, f)| *sum += n.weight * f);
     }
     let peak = histogram.iter().copied().fold(1e-12, f64::max);
-    for (at, Mixture { row, method, unaligned }) in rows.iter().enumerate() {
-        let y = 2 * LINE + at * step_y;
-        canvas.text(8, y + 8, &row.method);
-        canvas.text(8, y + 8 + LINE, &format!("level {level}, corner"));
+    let mut drawn = Vec::new();
+    for Mixture { row, method, unaligned } in &rows {
         let bake = Bake::new(subject.surface, &**unaligned).precision(subject.precision);
         let (apart, _) = bake.to_pyramid()?;
         let filtered = |pyramid: &Pyramid, method: &dyn Method| {
@@ -64,12 +59,16 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Result<Opt
         let evaluator = method.evaluator(&*pen, &lattice.directions);
         evaluate_neighbours(&row.pyramid, &*evaluator, (place, level as f64), &mut shaded);
         let columns =
-            [histogram.clone(), filtered(&apart, &**unaligned), filtered(&row.pyramid, &**method), shaded];
-        for (column, lobe) in columns.iter().enumerate() {
-            plot(&mut canvas, &lattice, (label + column * step_x, y), lobe, peak);
-        }
+            [&histogram, &filtered(&apart, &**unaligned), &filtered(&row.pyramid, &**method), &shaded];
+        let panels = columns.into_iter().map(|lobe| Some(Panel::of(disk.draw(lobe, peak)))).collect();
+        drawn.push(SheetRow { head: vec![row.method.clone()], panels });
     }
-    Ok(Some(canvas))
+    Ok(Some(Sheet {
+        title: format!("Normals at a corner between four texels of level {level}"),
+        columns: COLUMNS.map(str::to_owned).to_vec(),
+        rows: drawn,
+        scale: None,
+    }))
 }
 
 /// Mixture in the comparison: its row, its method, and the same method unaligned.

@@ -1,11 +1,12 @@
 //! Reports: pictures and an HTML page of a comparison, and contact sheets of renderings.
 
 mod between;
-mod canvas;
 mod disks;
 mod pictures;
 mod plot;
 mod sheet;
+
+use std::collections::BTreeMap;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -14,10 +15,13 @@ use ndfmap_core::measure::FilteringError;
 use ndfmap_maps::Source;
 
 use crate::Error;
-use crate::compare::{Comparison, LevelError, Subject, three_digits};
+use crate::compare::{Comparison, LevelError, Row, Subject, three_digits};
+use crate::draw::{Sheet, Theme};
 use crate::render::RenderReport;
 
-pub use pictures::{SheetPlan, contact_sheet};
+pub use between::corner_sheet;
+pub use pictures::{SheetPlan, contact_sheet, difference, difference_scale, drift_film, rendering_sheet};
+pub use plot::error_plot;
 
 /// Contents of a report, to be drawn.
 pub struct Pages<'a> {
@@ -31,6 +35,8 @@ pub struct Pages<'a> {
     pub source: &'a Source,
     /// Warnings of its reader.
     pub warnings: &'a [String],
+    /// Circumstances of the report, each a line at its end: command, date, machine.
+    pub circumstances: &'a [String],
 }
 
 /// File of a report.
@@ -46,49 +52,85 @@ pub struct ReportFile {
 /// # Errors
 /// [`Error::Failed`] for what cannot be drawn, and [`Error::Cancelled`].
 pub fn draw(pages: &Pages<'_>) -> Result<Vec<ReportFile>, Error> {
-    let sheet = sheet::draw(pages.subject, pages.comparison).to_png()?;
-    let disks = disks::draw(pages.subject, pages.comparison)?.to_png()?;
+    let (subject, comparison) = (pages.subject, pages.comparison);
+    let mut figures = vec![
+        Figure::of("contact-sheet.png", &sheet::draw(subject, comparison))?,
+        Figure::of("ndf.png", &disks::draw(subject, comparison)?)?,
+    ];
     // This figure bakes every mixture once more, unaligned: only those who ask about filtering should wait
     // for it.
-    let asked = pages.subject.filtering;
-    let between = if asked { between::draw(pages.subject, pages.comparison)? } else { None };
-    let between = between.map(|canvas| canvas.to_png()).transpose()?;
-    let plot = plot::errors_by_level(pages.comparison)?;
-    let scene = pages.pictures.map(|report| contact_sheet(report, &pages.source.file)).transpose()?;
-    let figures = Figures {
-        sheet: &sheet,
-        disks: &disks,
-        between: between.as_deref(),
-        scene: scene.as_deref(),
-        plot: &plot,
-    };
+    if let Some(sheet) = if subject.filtering { corner_sheet(subject, comparison)? } else { None } {
+        figures.push(Figure::of("alignment.png", &sheet)?);
+    }
+    if let Some(report) = pages.pictures {
+        figures.push(Figure::of("scene.png", &pictures::rendering_sheet(report, &pages.source.file)?)?);
+        if let (Some(light), Some(dark)) =
+            (drift_film(report, Theme::Light)?, drift_film(report, Theme::Dark)?)
+        {
+            figures.push(Figure { name: "drift.png", light, dark });
+        }
+    }
     let html = page(pages, &figures)?;
-    let json = serde_json::to_string_pretty(pages.comparison).map_err(|e| Error::Failed(e.to_string()))?;
-    let file = |name, bytes| ReportFile { name, bytes };
+    let json = serde_json::to_string_pretty(comparison).map_err(|e| Error::Failed(e.to_string()))?;
     let mut files = vec![
-        file(PAGE, html.into_bytes()),
-        file("contact-sheet.png", sheet),
-        file("ndf.png", disks),
-        file("compare.json", (json + "\n").into_bytes()),
+        ReportFile { name: PAGE, bytes: html.into_bytes() },
+        ReportFile { name: "compare.json", bytes: (json + "\n").into_bytes() },
     ];
-    files.extend(between.map(|between| file("alignment.png", between)));
-    files.extend(scene.map(|scene| file("scene.png", scene)));
+    files.extend(figures.into_iter().map(|figure| ReportFile { name: figure.name, bytes: figure.light }));
     Ok(files)
 }
 
-/// Figures of a page, drawn.
-struct Figures<'a> {
-    sheet: &'a [u8],
-    disks: &'a [u8],
-    between: Option<&'a [u8]>,
-    scene: Option<&'a [u8]>,
-    plot: &'a str,
+/// Figure of a page, drawn on light and on dark paper, as PNG.
+struct Figure {
+    name: &'static str,
+    light: Vec<u8>,
+    dark: Vec<u8>,
+}
+
+impl Figure {
+    fn of(name: &'static str, sheet: &Sheet) -> Result<Self, Error> {
+        let [light, dark] = Theme::ALL.map(|theme| sheet.draw(theme).to_png());
+        Ok(Self { name, light: light?, dark: dark? })
+    }
 }
 
 /// Name of the report's page, which holds its pictures.
 pub const PAGE: &str = "report.html";
 
-fn page(pages: &Pages<'_>, figures: &Figures<'_>) -> Result<String, Error> {
+/// Levels that a verdict is about: those of distances at which maps are seen.
+const JUDGED: std::ops::RangeInclusive<usize> = 2..=7;
+
+/// Rows that a verdict measures the best against, where they were compared: what renderers do today.
+const USUAL: [&str; 2] = ["naive", "toksvig"];
+
+/// Sentence that says which method is nearest to the truth, and by how much.
+fn verdict(comparison: &Comparison) -> Option<String> {
+    let mean = |row: &Row| {
+        let judged: Vec<f64> =
+            row.levels.iter().filter(|l| JUDGED.contains(&l.level)).map(|l| l.error).collect();
+        (!judged.is_empty()).then(|| judged.iter().sum::<f64>() / judged.len() as f64)
+    };
+    let all: Option<Vec<(&Row, f64)>> = comparison.rows.iter().map(|row| Some((row, mean(row)?))).collect();
+    let all = all?;
+    let (best, least) = all.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let others = all.iter().filter(|(row, _)| row.method != best.method);
+    let beside = |(row, error): &(&Row, f64)| {
+        format!("{:.2} of the error of {}", least / error.max(f64::MIN_POSITIVE), row.method)
+    };
+    let usual: Vec<String> =
+        others.clone().filter(|(row, _)| USUAL.contains(&row.method.as_str())).map(beside).collect();
+    let beside = if usual.is_empty() {
+        others.max_by(|a, b| a.1.total_cmp(&b.1)).map(beside).into_iter().collect()
+    } else {
+        usual
+    };
+    let (method, error) = (&best.method, three_digits(*least));
+    let judged = format!("{} to {}", JUDGED.start(), JUDGED.end().min(&(comparison.sizes.len() - 1)));
+    let tail = if beside.is_empty() { String::new() } else { format!(": {}", beside.join(", ")) };
+    Some(format!("Over levels {judged}, {method} is nearest to the truth, at a mean error of {error}{tail}."))
+}
+
+fn page(pages: &Pages<'_>, figures: &[Figure]) -> Result<String, Error> {
     let failed = |e: minijinja::Error| Error::Failed(format!("cannot write the report: {e}"));
     let mut environment = Environment::new();
     environment.add_template(PAGE, include_str!("../../templates/report.html")).map_err(failed)?;
@@ -123,6 +165,10 @@ fn page(pages: &Pages<'_>, figures: &Figures<'_>) -> Result<String, Error> {
         })
         .collect();
     let sizes: Vec<String> = comparison.sizes.iter().map(|s| format!("{}×{}", s.width, s.height)).collect();
+    let plots = Theme::ALL.map(|theme| error_plot(comparison).to_svg(theme));
+    let plots = plots.into_iter().collect::<Result<Vec<String>, Error>>()?;
+    let encode = |f: &Figure| (f.name, [&f.light, &f.dark].map(|png| STANDARD.encode(png)));
+    let encoded: BTreeMap<&str, [String; 2]> = figures.iter().map(encode).collect();
     let template = environment.get_template(PAGE).map_err(failed)?;
     template
         .render(context! {
@@ -132,11 +178,10 @@ fn page(pages: &Pages<'_>, figures: &Figures<'_>) -> Result<String, Error> {
             sizes => sizes,
             rows => rows,
             warnings => pages.warnings.to_vec(),
-            plot => figures.plot,
-            sheet => STANDARD.encode(figures.sheet),
-            disks => STANDARD.encode(figures.disks),
-            between => figures.between.map(|b| STANDARD.encode(b)),
-            scene => figures.scene.map(|s| STANDARD.encode(s)),
+            verdict => verdict(comparison),
+            plot => plots,
+            figures => encoded,
+            circumstances => pages.circumstances.to_vec(),
             filtering => filtering,
             version => env!("CARGO_PKG_VERSION"),
         })

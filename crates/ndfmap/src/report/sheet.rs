@@ -2,18 +2,18 @@
 
 use glam::DVec3;
 use ndfmap_core::brdf::AnyLobe;
-use ndfmap_core::grid::Size;
+use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::measure::TexelTruth;
 use ndfmap_core::sphere::DiskLattice;
 use ndfmap_scene::metrics::display_value;
 use rayon::prelude::*;
 
-use super::canvas::{Canvas, LETTER, LINE};
 use crate::compare::{Comparison, Subject, three_digits};
+use crate::draw::{Panel, Sheet, SheetRow};
 use ndfmap_core::ndf::AnyMethod;
 
 /// Pixels of a cell's longer side.
-const CELL: usize = 128;
+const CELL: usize = 176;
 
 /// Levels shown, at most.
 const ROWS: usize = 6;
@@ -31,7 +31,7 @@ struct Column {
 }
 
 /// Draws the sheet.
-pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Canvas {
+pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Sheet {
     // Finest level that fits a cell, and every one below it.
     let first = comparison.sizes.iter().position(|s| s.width.max(s.height) <= CELL).unwrap_or(0);
     let shown: Vec<(usize, Size)> =
@@ -42,33 +42,27 @@ pub(super) fn draw(subject: &Subject<'_>, comparison: &Comparison) -> Canvas {
     bright.sort_by(f64::total_cmp);
     let white = bright[bright.len() - 1 - bright.len() / 1000].max(1e-9);
 
-    let label = 11 * LETTER;
     let finest = comparison.sizes[0];
     let side = |n: usize| (n * CELL / finest.width.max(finest.height)).max(1);
-    let (width, height) = (side(finest.width), side(finest.height));
-    let (step_x, step_y) = (width.max(16 * LETTER) + 8, height + 2 * LINE);
-    let mut canvas = Canvas::new(label + columns.len() * step_x + 8, 2 * LINE + shown.len() * step_y);
-    for (at, column) in columns.iter().enumerate() {
-        let x = label + at * step_x;
-        canvas.text(x, 8, &column.title);
-        for (row, (_, size)) in shown.iter().enumerate() {
-            let y = 2 * LINE + row * step_y;
-            for j in 0..height {
-                for i in 0..width {
-                    let texel = (j * size.height / height) * size.width + i * size.width / width;
-                    let v = (display_value((column.levels[row][texel] / white) as f32) * 255.0).round() as u8;
-                    canvas.set(x + i, y + j, [v; 3]);
-                }
-            }
-            canvas.text(x, y + height + 3, &column.errors[row]);
-        }
+    let cell = Size { width: side(finest.width), height: side(finest.height) };
+    let row = |(at, (level, size)): (usize, &(usize, Size))| {
+        let panel = |column: &Column| {
+            let picture = Grid::from_fn(cell, |i, j| {
+                let texel = (j * size.height / cell.height) * size.width + i * size.width / cell.width;
+                let v = (display_value((column.levels[at][texel] / white) as f32) * 255.0).round() as u8;
+                [v; 3]
+            });
+            Some(Panel::of(picture).said(column.errors.get(at).cloned()))
+        };
+        let head = vec![format!("level {level}"), format!("{} × {}", size.width, size.height)];
+        SheetRow { head, panels: columns.iter().map(panel).collect() }
+    };
+    Sheet {
+        title: "The map under one light, at growing distances".to_owned(),
+        columns: columns.iter().map(|c| c.title.clone()).collect(),
+        rows: shown.iter().enumerate().map(row).collect(),
+        scale: None,
     }
-    for (row, (level, size)) in shown.iter().enumerate() {
-        let y = 2 * LINE + row * step_y;
-        canvas.text(8, y + 8, &format!("level {level}"));
-        canvas.text(8, y + 8 + LINE, &format!("{}x{}", size.width, size.height));
-    }
-    canvas
 }
 
 fn columns(subject: &Subject<'_>, comparison: &Comparison, shown: &[(usize, Size)]) -> Vec<Column> {
@@ -83,11 +77,7 @@ fn columns(subject: &Subject<'_>, comparison: &Comparison, shown: &[(usize, Size
         .iter()
         .map(|(_, size)| texels(*size).map(|(x, y)| truth.texel(*size, x, y)[0]).collect())
         .collect();
-    let mut columns = vec![Column {
-        title: "truth".to_owned(),
-        levels: true_levels,
-        errors: vec![String::new(); shown.len()],
-    }];
+    let mut columns = vec![Column { title: "truth".to_owned(), levels: true_levels, errors: Vec::new() }];
     for row in &comparison.rows {
         let Ok(method) = row.method.parse::<AnyMethod>() else { continue };
         let evaluator = method.evaluator(lobe, &lattice.directions);

@@ -1,0 +1,213 @@
+//! A plot of lines, as pixels or as SVG.
+
+use plotters::coord::Shift;
+use plotters::element::DashedPathElement;
+use plotters::prelude::{
+    BitMapBackend, ChartBuilder, Circle, Color, DrawingArea, DrawingBackend, EmptyElement, IntoDrawingArea,
+    IntoFont, LineSeries, PathElement, RGBColor, SVGBackend, SeriesLabelPosition,
+};
+use plotters::series::{DashedLineSeries, PointSeries};
+use plotters::style::{ShapeStyle, TextStyle};
+
+use ndfmap_core::grid::Size;
+
+use super::canvas::{Canvas, Rgb, Theme};
+use super::colour::line_colours;
+use super::text::{FAMILY, FOR_PLOTS};
+use crate::Error;
+
+/// Plot of lines over two axes.
+#[derive(Clone, Debug)]
+pub struct Plot {
+    /// Width and height in pixels.
+    pub size: Size,
+    /// Horizontal axis.
+    pub x: Axis,
+    /// Vertical axis.
+    pub y: Axis,
+    /// Lines, in the order of the legend.
+    pub lines: Vec<Line>,
+}
+
+/// Axis of a plot.
+#[derive(Clone, Debug, Default)]
+pub struct Axis {
+    /// Words beside it.
+    pub label: String,
+    /// Least and greatest number.
+    pub range: [f64; 2],
+    /// True where equal steps are equal factors; the range is positive then.
+    pub logarithmic: bool,
+}
+
+/// Line of a plot.
+#[derive(Clone, Debug, Default)]
+pub struct Line {
+    /// Name in the legend.
+    pub name: String,
+    /// Places, from left to right; those below a logarithmic axis lie on its end.
+    pub points: Vec<[f64; 2]>,
+    /// True for a dashed line, without points: a bound, or what a paper says.
+    pub dashed: bool,
+}
+
+impl Axis {
+    /// Place on the axis: the number, or its logarithm.
+    fn place(&self, value: f64) -> f64 {
+        if self.logarithmic { value.max(self.range[0]).log10() } else { value }
+    }
+
+    fn span(&self) -> std::ops::Range<f64> {
+        self.place(self.range[0])..self.place(self.range[1])
+    }
+
+    /// Words beside a tick.
+    fn tick(&self, place: f64) -> String {
+        let value = if self.logarithmic { 10.0_f64.powf(place) } else { place };
+        match value.abs() {
+            0.0 => "0".to_owned(),
+            v if v < 0.001 => format!("{value:.0e}"),
+            v if v >= 100.0 || (v - v.round()).abs() < 1e-9 => format!("{value:.0}"),
+            // Two digits that count, without zeros at the end.
+            v => {
+                let digits = (1.0 - v.log10().floor()).clamp(1.0, 5.0) as usize;
+                let text = format!("{value:.digits$}");
+                text.trim_end_matches('0').to_owned()
+            }
+        }
+    }
+}
+
+impl Plot {
+    /// Draws the plot.
+    #[must_use]
+    pub fn draw(&self, theme: Theme) -> Canvas {
+        let size = Size { width: self.size.width.max(64), height: self.size.height.max(64) };
+        let mut bytes = vec![0; 3 * size.area()];
+        {
+            let backend = BitMapBackend::with_buffer(&mut bytes, (size.width as u32, size.height as u32));
+            let drawn = self.on(&backend.into_drawing_area(), theme);
+            drawn.unwrap_or_else(|e| unreachable!("memory takes every pixel: {e}"));
+        }
+        Canvas::from_bytes(size, theme, &bytes)
+    }
+
+    /// The plot as SVG.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] for a plot that cannot be drawn.
+    pub fn to_svg(&self, theme: Theme) -> Result<String, Error> {
+        let mut svg = String::new();
+        {
+            let backend =
+                SVGBackend::with_string(&mut svg, (self.size.width as u32, self.size.height as u32));
+            let drawn = self.on(&backend.into_drawing_area(), theme);
+            drawn.map_err(|e| Error::Failed(format!("cannot draw the plot: {e}")))?;
+        }
+        Ok(svg)
+    }
+
+    fn on<D: DrawingBackend>(
+        &self,
+        area: &DrawingArea<D, Shift>,
+        theme: Theme,
+    ) -> Result<(), Box<dyn std::error::Error>>
+    where
+        D::ErrorType: 'static,
+    {
+        std::sync::LazyLock::force(&FOR_PLOTS);
+        let (paper, ink, faint) = (rgb(theme.paper()), rgb(theme.ink(false)), rgb(theme.ink(true)));
+        let words = |pixels: i32| TextStyle::from((FAMILY, pixels).into_font()).color(&ink);
+        area.fill(&paper)?;
+        let mut chart = ChartBuilder::on(area)
+            .margin(12)
+            .x_label_area_size(44)
+            .y_label_area_size(64)
+            .build_cartesian_2d(self.x.span(), self.y.span())?;
+        chart
+            .configure_mesh()
+            .x_desc(&self.x.label)
+            .y_desc(&self.y.label)
+            .axis_desc_style(words(15))
+            .label_style(words(14))
+            .axis_style(faint)
+            .x_label_formatter(&|x| self.x.tick(*x))
+            .y_label_formatter(&|y| self.y.tick(*y))
+            .bold_line_style(faint.mix(0.25))
+            .light_line_style(faint.mix(0.0))
+            .draw()?;
+        for (line, colour) in self.lines.iter().zip(line_colours(self.lines.len())) {
+            let colour = rgb(colour);
+            let style: ShapeStyle = colour.stroke_width(2);
+            let points = || line.points.iter().map(|[x, y]| (self.x.place(*x), self.y.place(*y)));
+            if line.dashed {
+                chart
+                    .draw_series(DashedLineSeries::new(points(), 6, 4, style))?
+                    .label(&line.name)
+                    .legend(move |(x, y)| DashedPathElement::new([(x, y), (x + 20, y)], 6, 4, style));
+                continue;
+            }
+            chart
+                .draw_series(LineSeries::new(points(), style))?
+                .label(&line.name)
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + 20, y)], style));
+            chart.draw_series(PointSeries::of_element(
+                points(),
+                3,
+                colour.filled(),
+                &|at, size, style| EmptyElement::at(at) + Circle::new((0, 0), size, style),
+            ))?;
+        }
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::LowerRight)
+            .label_font(words(14))
+            .background_style(paper.mix(0.85))
+            .border_style(faint.mix(0.5))
+            .draw()?;
+        area.present()?;
+        Ok(())
+    }
+}
+
+fn rgb([r, g, b]: Rgb) -> RGBColor {
+    RGBColor(r, g, b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plots_show_every_line_in_both_themes() {
+        let line = |i: usize| Line {
+            name: format!("line {i}"),
+            points: vec![[0.0, 0.1 * (i + 1) as f64], [5.0, 0.01 * (i + 1) as f64]],
+            dashed: i == 0,
+        };
+        let plot = Plot {
+            size: Size { width: 480, height: 300 },
+            x: Axis { label: "level".to_owned(), range: [0.0, 5.0], logarithmic: false },
+            y: Axis { label: "error".to_owned(), range: [0.001, 1.0], logarithmic: true },
+            lines: (0..4).map(line).collect(),
+        };
+        for theme in Theme::ALL {
+            let grid = plot.draw(theme).into_grid();
+            for colour in line_colours(4) {
+                assert!(grid.texels().iter().filter(|p| **p == colour).count() > 50, "{theme:?} {colour:?}");
+            }
+            let svg = plot.to_svg(theme).unwrap();
+            assert!(svg.contains("line 3") && svg.contains("error"), "{theme:?}");
+        }
+    }
+
+    #[test]
+    fn ticks_are_short() {
+        let axis = |logarithmic| Axis { logarithmic, ..Axis::default() };
+        assert_eq!(
+            [0.0, 0.5, 2.0, 0.25, 250.0, 0.0001].map(|v| axis(false).tick(v)),
+            ["0", "0.5", "2", "0.25", "250", "1e-4"]
+        );
+        assert_eq!([-1.0, 0.0, 2.0, -0.5].map(|v| axis(true).tick(v)), ["0.1", "1", "100", "0.32"]);
+    }
+}
