@@ -5,6 +5,38 @@ use ndfmap::choose::Choice;
 use ndfmap::compare::{Comparison, three_digits};
 use ndfmap::core::measure::{Estimate, FilteringError, SURE, UNSEEN};
 use ndfmap::render::{DriftReport, RenderReport};
+use ndfmap_figures::{Claim, Made, Paper, TABLE, Verdict, digits};
+
+/// List of the figures of the papers.
+pub(crate) fn figures() -> String {
+    let mut text = String::new();
+    for paper in Paper::ALL {
+        text += &format!("{}\n", paper.title());
+        for row in TABLE.iter().filter(|row| row.paper == paper) {
+            text += &format!("  {:15} {}: {}\n", row.name, row.place, row.summary);
+        }
+    }
+    text
+}
+
+/// Table of figures that were made: what they claim, the papers' numbers and ours.
+pub(crate) fn made(all: &[Made]) -> String {
+    let claims = || all.iter().flat_map(|made| &made.claims);
+    let longest = claims().map(|claim| claim.says.chars().count()).max().unwrap_or(0);
+    let mut text = String::new();
+    for made in all {
+        text += &format!("{}, {}: {}\n", made.figure, made.place, made.verdict);
+        text += &format!("  {:longest$} {:>9} {:>9}  holds\n", "", "paper", "ours");
+        for Claim { says, paper, ours, holds } in &made.claims {
+            let paper = paper.map_or_else(|| "-".to_owned(), digits);
+            let holds = holds.map_or("-", |holds| if holds { "yes" } else { "no" });
+            text += &format!("  {says:longest$} {paper:>9} {:>9}  {holds}\n", digits(*ours));
+        }
+        text += &format!("  {}\n\n", made.why);
+    }
+    let Verdict { judged, met } = Verdict::of(&claims().cloned().collect::<Vec<_>>());
+    text + &format!("{} figures; of {judged} statements that can be judged, {met} come out\n", all.len())
+}
 
 /// Table of a comparison: a row a method, a column a level.
 pub(crate) fn comparison(comparison: &Comparison) -> String {

@@ -8,6 +8,7 @@ mod arguments;
 mod bake;
 mod compare;
 mod demo;
+mod figure;
 mod inspect;
 mod render;
 #[cfg(feature = "gpu")]
@@ -64,6 +65,7 @@ enum Command {
     Inspect(inspect::Inspect),
     Compare(compare::Compare),
     Render(Box<render::Render>),
+    Figure(figure::FigureCommand),
     #[cfg(feature = "gpu")]
     Shader(shader::Shader),
     Completions(shell::Completions),
@@ -90,6 +92,7 @@ impl Program {
             Command::Inspect(command) => command.run(json),
             Command::Compare(command) => command.run(json),
             Command::Render(command) => command.run(json),
+            Command::Figure(command) => command.run(json),
             #[cfg(feature = "gpu")]
             Command::Shader(command) => command.run(json),
             Command::Completions(command) => command.run(),

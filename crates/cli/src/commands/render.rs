@@ -197,7 +197,7 @@ impl FilterArguments {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Device {
+pub(super) enum Device {
     /// A GPU, where there is one that is not software; else the processor
     Auto,
     /// The processor
@@ -209,7 +209,7 @@ enum Device {
 #[cfg(feature = "gpu")]
 impl Device {
     /// Opens the GPU to render on; `None` for the processor.
-    fn open(self) -> Result<Option<ndfmap::gpu::Device>, Error> {
+    pub(super) fn open(self) -> Result<Option<ndfmap::gpu::Device>, Error> {
         let opened = match self {
             Self::Cpu => return Ok(None),
             Self::Gpu => return Ok(Some(hushed(ndfmap::gpu::Device::open)?)),
@@ -222,6 +222,18 @@ impl Device {
         };
         say(format_args!("{said}: rendering on the processor"));
         Ok(None)
+    }
+}
+
+#[cfg(not(feature = "gpu"))]
+impl Device {
+    /// Refuses a GPU, which this program was built without.
+    pub(super) fn refuse_gpu(self) -> Result<(), Error> {
+        if self == Self::Gpu {
+            let why = "this program was built without its feature `gpu`";
+            return Err(Error::Request(format!("--device gpu: {why}")));
+        }
+        Ok(())
     }
 }
 
@@ -430,10 +442,7 @@ impl Render {
             }
         }
         #[cfg(not(feature = "gpu"))]
-        if self.device == Device::Gpu {
-            let why = "this program was built without its feature `gpu`";
-            return Err(Error::Request(format!("--device gpu: {why}")));
-        }
+        self.device.refuse_gpu()?;
         if self.sampler.is_some() || self.multisample {
             let why = "`--sampler` and `--multisample` are a GPU's";
             return Err(Error::Request(format!("{why}: name it with `--device gpu`")));

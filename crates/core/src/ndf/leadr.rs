@@ -129,6 +129,38 @@ impl SlopeGaussian {
     }
 }
 
+/// Facet that mirrors what the eye sees of it, among those that stand for a Gaussian of slopes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MirroredFacet {
+    /// Direction that the light comes from, unit length.
+    pub towards: DVec3,
+    /// Share of what the eye sees; the shares of all facets sum to one.
+    pub share: f64,
+    /// Level of a cube map that is looked up for it.
+    pub lod: f64,
+}
+
+impl SlopeGaussian {
+    /// Facets of a grid as the eye at `wo` sees them on a displaced surface, mirroring a cube map of `side`
+    /// texels: the filter that the sum over the grid amounts to, drawn in the paper's figure 5.
+    #[must_use]
+    pub fn mirrored(&self, grid: &SlopeGrid, wo: DVec3, side: usize) -> Vec<MirroredFacet> {
+        let mut facets = Vec::new();
+        self.samples(grid, |sample| {
+            let seen = sample.weight * sample.slope_normal.dot(wo);
+            if seen > 0.0 {
+                let n = sample.slope_normal.normalize();
+                let u = n.dot(wo);
+                let lod = self.level(grid, &sample, u, side);
+                facets.push(MirroredFacet { towards: 2.0 * u * n - wo, share: seen, lod });
+            }
+        });
+        let all: f64 = facets.iter().map(|f| f.share).sum();
+        facets.iter_mut().for_each(|f| f.share /= all);
+        facets
+    }
+}
+
 /// A slope that stands for some of a Gaussian.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SlopeSample {
@@ -154,8 +186,10 @@ pub struct SlopeGrid {
 }
 
 impl SlopeGrid {
-    /// The grid of `n` × `n`.
-    pub(super) fn new(n: usize) -> Self {
+    /// The grid of `n` × `n`, at least two each way.
+    #[must_use]
+    pub fn new(n: usize) -> Self {
+        let n = n.max(2);
         let step = Self::step(n);
         let at = |i: usize| (i as f64 - (n - 1) as f64 / 2.0) * step;
         let weight = |p: f64| (-0.5 * p * p).exp();
@@ -164,7 +198,8 @@ impl SlopeGrid {
     }
 
     /// Set of `n` × `n` slopes drawn at random, always the same ones.
-    pub(super) fn drawn(n: usize) -> Self {
+    #[must_use]
+    pub fn drawn(n: usize) -> Self {
         Self { drawn: true, ..Self::new(n) }
     }
 

@@ -39,7 +39,7 @@ pub use environment::LocalEnvironment;
 pub use fixed::Fixed;
 pub use form::{Form, FormKind};
 pub use gmm::{GaussianMixture, Gmm};
-pub use leadr::SlopeGrid;
+pub use leadr::{MirroredFacet, SlopeGrid};
 pub use method::{AnyMethod, Describe, Evaluator, FlatLobe, Method, Representation, Sample};
 pub use mixture::{LobeSums, NormalLobe, Response, SERIES_ORDER};
 pub use naive::Naive;

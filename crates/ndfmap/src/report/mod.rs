@@ -20,7 +20,7 @@ use crate::draw::{Sheet, Theme};
 use crate::render::RenderReport;
 
 pub use between::corner_sheet;
-pub use pictures::{SheetPlan, contact_sheet, difference, difference_scale, drift_film, rendering_sheet};
+pub use pictures::{DifferenceColours, SheetPlan, contact_sheet, drift_film, rendering_sheet};
 pub use plot::error_plot;
 
 /// Contents of a report, to be drawn.

@@ -1,6 +1,7 @@
 //! The contact sheet of a rendering: truth and every method side by side, their differences, and the errors
 //! under them. And the same as a film, as the camera drifts.
 
+use glam::Vec3;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_scene::metrics::{Picture, display, to_bytes};
 
@@ -8,37 +9,60 @@ use crate::Error;
 use crate::draw::{Panel, Rgb, Scale, Sheet, SheetRow, Theme, enlarged, film, heat};
 use crate::render::{Frame, PictureErrors, RenderReport};
 
-/// Difference of display values, over sqrt 3, that is drawn brightest.
-const BRIGHTEST: f32 = 0.5;
-
 /// Pixels of the longer side of the smallest pictures on a sheet; smaller ones are enlarged.
 const LEAST_SIDE: usize = 192;
 
 /// Milliseconds of a frame of a film.
 const FRAME_MS: u16 = 80;
 
-/// Scale of the pictures of differences.
-#[must_use]
-pub fn difference_scale() -> Scale {
-    Scale {
-        title: "difference of display colours".to_owned(),
-        low: "0".to_owned(),
-        high: format!("{BRIGHTEST} and more"),
-        colour: heat,
+/// Colours of the differences of display values, over sqrt 3, on one sheet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DifferenceColours {
+    /// Difference that is drawn lightest.
+    pub lightest: f32,
+}
+
+impl DifferenceColours {
+    /// Colours that show what differs on a sheet: one in two hundred pixels may be beyond the lightest.
+    #[must_use]
+    pub fn of<'a>(pairs: impl Iterator<Item = (&'a Picture, &'a Picture)>, exposure: f32) -> Self {
+        const STEPS: [f32; 5] = [0.02, 0.05, 0.1, 0.2, 0.5];
+        let mut all: Vec<f32> = pairs
+            .flat_map(|(a, b)| a.texels().iter().zip(b.texels()))
+            .map(|(a, b)| apart(*a, *b, exposure))
+            .collect();
+        let place = all.len() - all.len() / 200;
+        let most = if place == 0 { 0.0 } else { *all.select_nth_unstable_by(place - 1, f32::total_cmp).1 };
+        Self { lightest: STEPS.into_iter().find(|step| *step >= most).unwrap_or(STEPS[4]) }
+    }
+
+    /// Scale to be drawn beside them.
+    #[must_use]
+    pub fn scale(self) -> Scale {
+        Scale {
+            title: "difference of display colours".to_owned(),
+            low: "0".to_owned(),
+            high: format!("{} and more", self.lightest),
+            colour: heat,
+        }
+    }
+
+    /// Picture of the difference of two pictures.
+    ///
+    /// # Panics
+    /// When the pictures differ in size.
+    #[must_use]
+    pub fn draw(self, a: &Picture, truth: &Picture, exposure: f32) -> Grid<Rgb> {
+        assert_eq!(a.size(), truth.size(), "pictures that are compared have one size");
+        Grid::from_fn(a.size(), |x, y| {
+            heat(f64::from(apart(a.row(y)[x], truth.row(y)[x], exposure) / self.lightest))
+        })
     }
 }
 
-/// Picture of the difference of two pictures' display values, by the colours of [`difference_scale`].
-///
-/// # Panics
-/// When the pictures differ in size.
-#[must_use]
-pub fn difference(a: &Picture, truth: &Picture, exposure: f32) -> Grid<Rgb> {
-    assert_eq!(a.size(), truth.size(), "pictures that are compared have one size");
-    Grid::from_fn(a.size(), |x, y| {
-        let distance = display(a.row(y)[x], exposure).distance(display(truth.row(y)[x], exposure));
-        heat(f64::from(distance / 3.0_f32.sqrt() / BRIGHTEST))
-    })
+/// Distance of the display values of two colours, over sqrt 3.
+fn apart(a: Vec3, b: Vec3, exposure: f32) -> f32 {
+    display(a, exposure).distance(display(b, exposure)) / 3.0_f32.sqrt()
 }
 
 /// Layout of a contact sheet, before its pictures are rendered.
@@ -79,13 +103,21 @@ pub fn rendering_sheet(report: &RenderReport, title: &str) -> Result<Sheet, Erro
         if frame.pictures.is_empty() {
             return Err(Error::Request("the pictures were not kept".to_owned()));
         }
-        rows.extend(rows_of(frame));
     }
-    let scale = has_truth.then(difference_scale);
+    let exposure = report.frames.first().map_or(1.0, |f| f.exposure);
+    let colours = DifferenceColours::of(report.frames.iter().flat_map(compared), exposure);
+    rows.extend(report.frames.iter().flat_map(|frame| rows_of(frame, colours)));
+    let scale = has_truth.then(|| colours.scale());
     Ok(Sheet { title: title.to_owned(), columns: names.collect(), rows, scale })
 }
 
-fn rows_of(frame: &Frame) -> Vec<SheetRow> {
+/// Pictures of a frame, each with the truth.
+fn compared(frame: &Frame) -> Vec<(&Picture, &Picture)> {
+    let split = frame.pictures.split_first().filter(|_| frame.truth.is_some());
+    split.map_or_else(Vec::new, |(truth, taken)| taken.iter().map(|p| (p, truth)).collect())
+}
+
+fn rows_of(frame: &Frame, colours: DifferenceColours) -> Vec<SheetRow> {
     let shown = |p: &Picture| Panel::of(enlarged(&to_bytes(p, frame.exposure), LEAST_SIDE));
     let time = vec![format!("time {:.3}", frame.time)];
     let (Some(said), Some((truth, taken))) = (frame.truth, frame.pictures.split_first()) else {
@@ -95,7 +127,7 @@ fn rows_of(frame: &Frame) -> Vec<SheetRow> {
     let lines = [format!("{} rays a pixel", said.rays), format!("noise {:.4}", said.noise)];
     let pictures = std::iter::once(shown(truth).said(lines)).chain(taken.iter().map(shown)).map(Some);
     let parts = frame.results.iter().zip(taken).map(|(result, picture)| {
-        let apart = enlarged(&difference(picture, truth, frame.exposure), LEAST_SIDE);
+        let apart = enlarged(&colours.draw(picture, truth, frame.exposure), LEAST_SIDE);
         Some(Panel::of(apart).said(result.errors.iter().flat_map(|e| lines_of(*e))))
     });
     vec![
@@ -164,4 +196,26 @@ fn liveliest(frame: &Frame) -> (Size, (usize, usize)) {
         .flat_map(|j| (0..9).map(move |i| ((width - size.width) * i / 8, (height - size.height) * j / 8)));
     let best = steps.max_by(|a, b| change(*a).total_cmp(&change(*b)));
     (size, best.unwrap_or((0, 0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_of_differences_span_what_differs() {
+        let flat = |value: f32| Picture::from_fn(Size { width: 20, height: 20 }, |_, _| Vec3::splat(value));
+        let one = |x: usize, y: usize, value: f32| Vec3::splat(if x + y == 0 { value } else { 0.5 });
+        let spot = Picture::from_fn(Size { width: 20, height: 20 }, |x, y| one(x, y, 1.0));
+        let of = |a: &Picture, b: &Picture| DifferenceColours::of(std::iter::once((a, b)), 1.0).lightest;
+        assert_eq!(of(&flat(0.5), &flat(0.5)), 0.02);
+        // Two pixels of four hundred may be beyond the lightest.
+        assert_eq!(of(&spot, &flat(0.5)), 0.02);
+        assert_eq!(of(&flat(0.0), &flat(1.0)), 0.5);
+        // 0.5 is 0.735 on a display, 0.6 is 0.798.
+        assert_eq!(of(&flat(0.5), &flat(0.6)), 0.1);
+        let colours = DifferenceColours { lightest: 0.5 };
+        assert_eq!(colours.draw(&flat(0.0), &flat(1.0), 1.0).row(0)[0], heat(1.0));
+        assert_eq!(colours.draw(&flat(0.3), &flat(0.3), 1.0).row(0)[0], heat(0.0));
+    }
 }

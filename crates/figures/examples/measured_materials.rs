@@ -1,7 +1,7 @@
 //! The table of measured materials in `docs/environment.md`: what their factors leave, and how far `sh:7` and
 //! `vmf:6` are from the truth.
 //!
-//! `cargo run --release -p ndfmap-figures --bin measured_materials [-- MAP]`; without a map, on built-in
+//! `cargo run --release -p ndfmap-figures --example measured_materials [-- MAP]`; without a map, on built-in
 //! foil.
 
 use std::path::PathBuf;

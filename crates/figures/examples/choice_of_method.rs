@@ -1,7 +1,7 @@
 //! Error of a few methods over a folder of normal maps, at texels and between them: the table of
 //! `docs/choose.md`.
 //!
-//! `cargo run --release -p ndfmap-figures --bin choice_of_method -- FOLDER [LOBE [METHOD,METHOD]]`; the
+//! `cargo run --release -p ndfmap-figures --example choice_of_method -- FOLDER [LOBE [METHOD,METHOD]]`; the
 //! first method is the one that others are divided by.
 
 use std::path::{Path, PathBuf};

@@ -1,0 +1,56 @@
+//! Olano and North, sections 4 and 8: densities on the sphere, and how well they mix.
+
+use ndfmap::Error;
+use ndfmap::draw::{Panel, Sheet, SheetRow};
+use ndfmap::report::error_plot;
+
+use super::texels::{builtin, compared};
+use crate::{Claim, Drawing, Figure, Paper, Plan};
+
+pub(crate) const ROW: Figure = Figure {
+    name: "olano-densities",
+    paper: Paper::Olano,
+    place: "Figure 5, sections 4 to 6",
+    summary: "densities of normals by projection and by a Gaussian in space, after mixing",
+    draw,
+};
+
+/// Methods: Gaussian in space by its exact and by its printed factor, on a plane, on the hemisphere, on the
+/// whole sphere by stereographic projection.
+const METHODS: [&str; 5] = ["ndm", "ndm:gaussian", "ndm:plane", "slopes", "stereographic"];
+
+/// Maps that are measured.
+const MAPS: [&str; 3] = ["foil", "ripples", "weave"];
+
+/// Levels over which errors are averaged.
+const LEVELS: std::ops::RangeInclusive<usize> = 2..=6;
+
+fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
+    let (mut claims, mut panels) = (Vec::new(), Vec::new());
+    for name in MAPS {
+        let map = builtin(plan, name, 512)?;
+        let comparison = compared(plan, &*map.surface, "blinn-phong:50", &METHODS, false)?;
+        let mean = |at: usize| {
+            let levels = comparison.rows[at].levels.iter().filter(|l| LEVELS.contains(&l.level));
+            let errors: Vec<f64> = levels.map(|l| l.error).collect();
+            errors.iter().sum::<f64>() / errors.len().max(1) as f64
+        };
+        for (at, method) in METHODS.iter().enumerate() {
+            let claim = Claim::number(format!("{name}: error of {method}"), mean(at));
+            let judged = match *method {
+                "stereographic" => claim.holds(mean(at) > mean(0)),
+                _ => claim,
+            };
+            claims.push(judged);
+        }
+        panels.push(Some(Panel::plot(error_plot(&comparison)).said([(*name).to_owned()])));
+    }
+    let rows = panels.into_iter().map(|panel| SheetRow { head: Vec::new(), panels: vec![panel] }).collect();
+    let title = "Densities of normals after mixing".to_owned();
+    Ok(Drawing {
+        sheets: vec![Sheet { title, columns: Vec::new(), rows, scale: None }],
+        claims,
+        why: "Judged is the paper's statement that a stereographic Gaussian is no good approximation of a mixture, \
+              held to the Gaussian in space: moments on the plane mix exactly, and the density is one of them.",
+    })
+}
