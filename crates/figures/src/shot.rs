@@ -1,5 +1,6 @@
 //! Scenes by brute force and through baked maps, side by side.
 
+use glam::Vec3;
 use ndfmap::core::grid::{Grid, Size};
 use ndfmap::core::lookup::{Filtering, Lookups};
 use ndfmap::core::ndf::AnyMethod;
@@ -85,8 +86,9 @@ impl<'a> Shot<'a> {
         head: impl Into<String>,
     ) -> Result<Shown, Error> {
         let TruePicture { picture, noise, rays } = self.truth(effort)?;
-        let exposure = self.scene.exposure;
-        Ok(Shown { head: head.into(), truth: picture, rays, noise, pictures: self.filtered(maps)?, exposure })
+        let window = Window::of(&picture, self.scene.background);
+        let (head, pictures, exposure) = (head.into(), self.filtered(maps)?, self.scene.exposure);
+        Ok(Shown { head, truth: picture, rays, noise, pictures, exposure, window })
     }
 }
 
@@ -98,9 +100,54 @@ pub(crate) struct Shown {
     pub(crate) noise: f64,
     pub(crate) pictures: Vec<Picture>,
     pub(crate) exposure: f32,
+    /// Part that sheets show; errors are of the whole.
+    window: Option<Window>,
+}
+
+/// Part of a picture: a square around all that is no background.
+#[derive(Clone, Copy)]
+struct Window {
+    corner: (usize, usize),
+    side: usize,
+}
+
+impl Window {
+    /// The part, where it is less than half of the picture each way.
+    fn of(picture: &Picture, background: Vec3) -> Option<Self> {
+        let Size { width, height } = picture.size();
+        let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        let covered: Vec<(usize, usize)> =
+            places.filter(|(x, y)| picture.row(*y)[*x] != background).collect();
+        let range = |of: fn(&(usize, usize)) -> usize| {
+            covered.iter().map(of).fold((usize::MAX, 0), |(low, high), v| (low.min(v), high.max(v)))
+        };
+        let ((left, right), (top, bottom)) = (range(|at| at.0), range(|at| at.1));
+        if left > right {
+            return None;
+        }
+        let side = (right - left).max(bottom - top) + 5;
+        let corner = |low: usize, high: usize, all: usize| {
+            ((low + high + 1).saturating_sub(side) / 2).min(all.saturating_sub(side))
+        };
+        (2 * side < width.min(height))
+            .then(|| Self { corner: (corner(left, right, width), corner(top, bottom, height)), side })
+    }
+
+    /// The part of a picture, enlarged to nearly its size.
+    fn cut(self, picture: &Grid<Rgb>) -> Grid<Rgb> {
+        let size = Size { width: self.side, height: self.side };
+        let part = Grid::from_fn(size, |x, y| picture.row(self.corner.1 + y)[self.corner.0 + x]);
+        enlarged(&part, picture.size().width / self.side * self.side)
+    }
 }
 
 impl Shown {
+    /// A picture as it is shown.
+    fn panel(&self, picture: &Grid<Rgb>) -> Panel {
+        let cut = self.window.map(|window| window.cut(picture));
+        Panel::of(enlarged(&cut.unwrap_or_else(|| picture.clone()), LEAST_SIDE))
+    }
+
     /// Relative L2 error of a picture.
     pub(crate) fn l2(&self, at: usize) -> f64 {
         relative_l2(&self.pictures[at], &self.truth)
@@ -113,13 +160,15 @@ impl Shown {
 
     /// A row of pictures, and one of their differences from the truth.
     fn rows(&self, colours: DifferenceColours) -> [SheetRow; 2] {
-        let panel = |p: &Picture| Panel::of(shown(p, self.exposure));
+        let panel = |p: &Picture| self.panel(&to_bytes(p, self.exposure));
+        let part = self.window.map(|w| format!("part of {0} × {0} pixels", w.side));
         let said = [format!("{} rays a pixel", self.rays), format!("noise {:.4}", self.noise)];
+        let said: Vec<String> = said.into_iter().chain(part).collect();
         let pictures = self.pictures.iter().map(panel);
         let differences = self.pictures.iter().enumerate().map(|(at, picture)| {
-            let apart = enlarged(&colours.draw(picture, &self.truth, self.exposure), LEAST_SIDE);
+            let apart = colours.draw(picture, &self.truth, self.exposure);
             let said = [format!("colour {:.4}", self.colour(at)), format!("L2 {:.3}", self.l2(at))];
-            Some(Panel::of(apart).said(said))
+            Some(self.panel(&apart).said(said))
         });
         [
             SheetRow {

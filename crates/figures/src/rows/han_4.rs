@@ -2,7 +2,7 @@
 
 use ndfmap::Error;
 
-use super::texels::lobe;
+use super::texels::{builtin, lobe};
 use crate::shot::{Maps, Shot, scene, sheet};
 use crate::{Claim, Drawing, Figure, Paper, Plan};
 
@@ -19,6 +19,7 @@ const MATERIALS: [&str; 2] = ["sgd:green-latex", "sgd:gold-metallic-paint"];
 
 fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
     let mut spec = scene("sphere", plan.map(512));
+    spec.map = Some(builtin(plan, "foil", 512)?.surface.into());
     let maps = Maps::bake(plan, &spec.build(0.0, plan.observer)?, &["sh:7", "vmf:6", "naive"])?;
     let (mut all, mut claims) = (Vec::new(), Vec::new());
     for material in MATERIALS {

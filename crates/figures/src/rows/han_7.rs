@@ -37,7 +37,7 @@ fn on_a_sphere(disk: &Disk) -> Vec<DVec3> {
 }
 
 fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
-    let map = builtin(plan, "armour", 512)?;
+    let map = builtin(plan, "armour", 256)?;
     let surface = &*map.surface;
     let level = level_sizes(surface.size()).len() - 4;
     let texel = Texel { level, x: 2, y: 3 };

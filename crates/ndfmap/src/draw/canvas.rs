@@ -120,10 +120,4 @@ impl Canvas {
         png::encode(&self.pixels, self.size)
             .map_err(|e| Error::Failed(format!("cannot write a picture: {e}")))
     }
-
-    /// The pixels' bytes, row by row, for a library that draws into them.
-    pub(super) fn from_bytes(size: Size, theme: Theme, bytes: &[u8]) -> Self {
-        let pixels = bytes.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
-        Self { size, theme, pixels }
-    }
 }

@@ -3,18 +3,22 @@
 use plotters::coord::Shift;
 use plotters::element::DashedPathElement;
 use plotters::prelude::{
-    BitMapBackend, ChartBuilder, Circle, Color, DrawingArea, DrawingBackend, EmptyElement, IntoDrawingArea,
-    IntoFont, LineSeries, PathElement, RGBColor, SVGBackend, SeriesLabelPosition,
+    BitMapBackend, ChartBuilder, Circle, Color, DrawingArea, DrawingBackend, IntoDrawingArea, IntoFont,
+    LineSeries, PathElement, RGBColor, SVGBackend, SeriesLabelPosition,
 };
-use plotters::series::{DashedLineSeries, PointSeries};
+use plotters::series::DashedLineSeries;
 use plotters::style::{ShapeStyle, TextStyle};
 
-use ndfmap_core::grid::Size;
+use ndfmap_core::grid::{Grid, Size};
 
 use super::canvas::{Canvas, Rgb, Theme};
 use super::colour::line_colours;
 use super::text::{FAMILY, FOR_PLOTS};
 use crate::Error;
+
+/// Pixels that a plot is drawn with for each of its own, each way: lines are smooth then, and letters stand
+/// where they should, not on whole pixels.
+const FINER: usize = 3;
 
 /// Plot of lines over two axes.
 #[derive(Clone, Debug)]
@@ -61,6 +65,12 @@ impl Axis {
         self.place(self.range[0])..self.place(self.range[1])
     }
 
+    /// Number of ticks to aim at: whole powers of ten where there are several.
+    fn ticks(&self) -> usize {
+        let decades = if self.logarithmic { (self.range[1] / self.range[0]).log10() } else { 0.0 };
+        if decades > 2.0 { decades.ceil() as usize } else { 10 }
+    }
+
     /// Words beside a tick.
     fn tick(&self, place: f64) -> String {
         let value = if self.logarithmic { 10.0_f64.powf(place) } else { place };
@@ -83,13 +93,25 @@ impl Plot {
     #[must_use]
     pub fn draw(&self, theme: Theme) -> Canvas {
         let size = Size { width: self.size.width.max(64), height: self.size.height.max(64) };
-        let mut bytes = vec![0; 3 * size.area()];
+        let fine = Size { width: FINER * size.width, height: FINER * size.height };
+        let mut bytes = vec![0; 3 * fine.area()];
         {
-            let backend = BitMapBackend::with_buffer(&mut bytes, (size.width as u32, size.height as u32));
-            let drawn = self.on(&backend.into_drawing_area(), theme);
+            let backend = BitMapBackend::with_buffer(&mut bytes, (fine.width as u32, fine.height as u32));
+            let drawn = self.on(&backend.into_drawing_area(), theme, FINER as u32);
             drawn.unwrap_or_else(|e| unreachable!("memory takes every pixel: {e}"));
         }
-        Canvas::from_bytes(size, theme, &bytes)
+        let mean = |x: usize, y: usize| -> Rgb {
+            std::array::from_fn(|c| {
+                let at = |i: usize| {
+                    let (x, y) = (FINER * x + i % FINER, FINER * y + i / FINER);
+                    usize::from(bytes[3 * (y * fine.width + x) + c])
+                };
+                ((0..FINER * FINER).map(at).sum::<usize>() / (FINER * FINER)) as u8
+            })
+        };
+        let mut canvas = Canvas::new(size, theme);
+        canvas.picture((0, 0), &Grid::from_fn(size, mean));
+        canvas
     }
 
     /// The plot as SVG.
@@ -101,7 +123,7 @@ impl Plot {
         {
             let backend =
                 SVGBackend::with_string(&mut svg, (self.size.width as u32, self.size.height as u32));
-            let drawn = self.on(&backend.into_drawing_area(), theme);
+            let drawn = self.on(&backend.into_drawing_area(), theme, 1);
             drawn.map_err(|e| Error::Failed(format!("cannot draw the plot: {e}")))?;
         }
         Ok(svg)
@@ -111,18 +133,20 @@ impl Plot {
         &self,
         area: &DrawingArea<D, Shift>,
         theme: Theme,
+        scale: u32,
     ) -> Result<(), Box<dyn std::error::Error>>
     where
         D::ErrorType: 'static,
     {
         std::sync::LazyLock::force(&FOR_PLOTS);
         let (paper, ink, faint) = (rgb(theme.paper()), rgb(theme.ink(false)), rgb(theme.ink(true)));
-        let words = |pixels: i32| TextStyle::from((FAMILY, pixels).into_font()).color(&ink);
+        let pixels = |n: u32| n * scale;
+        let words = |n: u32| TextStyle::from((FAMILY, pixels(n)).into_font()).color(&ink);
         area.fill(&paper)?;
         let mut chart = ChartBuilder::on(area)
-            .margin(12)
-            .x_label_area_size(44)
-            .y_label_area_size(64)
+            .margin(pixels(12))
+            .x_label_area_size(pixels(44))
+            .y_label_area_size(pixels(64))
             .build_cartesian_2d(self.x.span(), self.y.span())?;
         chart
             .configure_mesh()
@@ -130,40 +154,43 @@ impl Plot {
             .y_desc(&self.y.label)
             .axis_desc_style(words(15))
             .label_style(words(14))
-            .axis_style(faint)
+            .axis_style(faint.stroke_width(scale))
+            .x_labels(self.x.ticks())
+            .y_labels(self.y.ticks())
+            .set_all_tick_mark_size(pixels(5))
             .x_label_formatter(&|x| self.x.tick(*x))
             .y_label_formatter(&|y| self.y.tick(*y))
-            .bold_line_style(faint.mix(0.25))
+            .bold_line_style(faint.mix(0.25).stroke_width(scale))
             .light_line_style(faint.mix(0.0))
             .draw()?;
+        let long = pixels(20) as i32;
         for (line, colour) in self.lines.iter().zip(line_colours(self.lines.len())) {
             let colour = rgb(colour);
-            let style: ShapeStyle = colour.stroke_width(2);
+            let style: ShapeStyle = colour.stroke_width(pixels(2));
             let points = || line.points.iter().map(|[x, y]| (self.x.place(*x), self.y.place(*y)));
             if line.dashed {
                 chart
-                    .draw_series(DashedLineSeries::new(points(), 6, 4, style))?
+                    .draw_series(DashedLineSeries::new(points(), pixels(6), pixels(4), style))?
                     .label(&line.name)
-                    .legend(move |(x, y)| DashedPathElement::new([(x, y), (x + 20, y)], 6, 4, style));
+                    .legend(move |(x, y)| {
+                        DashedPathElement::new([(x, y), (x + long, y)], pixels(6), pixels(4), style)
+                    });
                 continue;
             }
             chart
                 .draw_series(LineSeries::new(points(), style))?
                 .label(&line.name)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 20, y)], style));
-            chart.draw_series(PointSeries::of_element(
-                points(),
-                3,
-                colour.filled(),
-                &|at, size, style| EmptyElement::at(at) + Circle::new((0, 0), size, style),
-            ))?;
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + long, y)], style));
+            chart.draw_series(points().map(|at| Circle::new(at, pixels(3), colour.filled())))?;
         }
         chart
             .configure_series_labels()
             .position(SeriesLabelPosition::LowerRight)
             .label_font(words(14))
+            .legend_area_size(pixels(30))
+            .margin(pixels(8))
             .background_style(paper.mix(0.85))
-            .border_style(faint.mix(0.5))
+            .border_style(faint.mix(0.5).stroke_width(scale))
             .draw()?;
         area.present()?;
         Ok(())
@@ -194,7 +221,9 @@ mod tests {
         for theme in Theme::ALL {
             let grid = plot.draw(theme).into_grid();
             for colour in line_colours(4) {
-                assert!(grid.texels().iter().filter(|p| **p == colour).count() > 50, "{theme:?} {colour:?}");
+                // Half of a line's width is its edges, mixed with paper.
+                let near = |p: &&Rgb| p.iter().zip(colour).all(|(a, b)| a.abs_diff(b) < 40);
+                assert!(grid.texels().iter().filter(near).count() > 50, "{theme:?} {colour:?}");
             }
             let svg = plot.to_svg(theme).unwrap();
             assert!(svg.contains("line 3") && svg.contains("error"), "{theme:?}");
