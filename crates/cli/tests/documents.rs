@@ -63,3 +63,24 @@ fn errors_of_printed_forms_come_out() {
         format!("{} / {}", three_digits(at), three_digits(between))
     });
 }
+
+#[test]
+fn numbers_of_figures_come_out() {
+    // In full, for figures that take seconds; the statements of the others are those of the program.
+    let rows = table("figures.md", "## Made again by a test");
+    let mut names: Vec<&str> = rows[1..].iter().map(|row| row[0].as_str()).collect();
+    names.dedup();
+    let folder = tempfile::tempdir().unwrap();
+    let told = json(&["figure", &names.join(","), "--json", "-o", folder.path().to_str().unwrap()]);
+    let mut made = Vec::new();
+    for figure in told["figures"].as_array().unwrap() {
+        for claim in figure["claims"].as_array().unwrap() {
+            let holds = claim["holds"].as_bool().map_or("", |holds| if holds { "yes" } else { "no" });
+            let ours = ndfmap_figures::digits(claim["ours"].as_f64().unwrap());
+            let of = |value: &Value| value.as_str().unwrap().to_owned();
+            made.push(vec![of(&figure["figure"]), of(&claim["says"]), ours, holds.to_owned()]);
+        }
+    }
+    assert!(!made.is_empty());
+    assert_eq!(rows[1..], made);
+}

@@ -1,5 +1,7 @@
 //! Scenes by brute force and through baked maps, side by side.
 
+use std::time::Instant;
+
 use glam::Vec3;
 use ndfmap::core::grid::{Grid, Size};
 use ndfmap::core::lookup::{Filtering, Lookups};
@@ -68,14 +70,23 @@ impl<'a> Shot<'a> {
 
     /// Pictures through maps, in their order.
     pub(crate) fn filtered(&self, maps: &Maps) -> Result<Vec<Picture>, Error> {
+        let geometry = Geometry::displaced(self.scene, &self.scene.camera, self.size);
+        (0..maps.0.len()).map(|at| self.through(maps, at, &geometry)).collect()
+    }
+
+    /// Seconds that the picture through one of the maps takes, the scene being set up.
+    pub(crate) fn seconds(&self, maps: &Maps, at: usize) -> Result<f64, Error> {
+        let geometry = Geometry::displaced(self.scene, &self.scene.camera, self.size);
+        let start = Instant::now();
+        self.through(maps, at, &geometry)?;
+        Ok(start.elapsed().as_secs_f64())
+    }
+
+    fn through(&self, maps: &Maps, at: usize, geometry: &Geometry) -> Result<Picture, Error> {
         let Self { plan, scene, size, lookups } = *self;
-        let geometry = Geometry::displaced(scene, &scene.camera, size);
         plan.observer.begin("filtered");
-        let draw = |(_, maps): &(String, BakedMaps)| {
-            let filtered = Filtered { scene, geometry: &geometry, maps };
-            Ok(filtered.render(&scene.camera, size, lookups, plan.observer)?)
-        };
-        maps.0.iter().map(draw).collect()
+        let filtered = Filtered { scene, geometry, maps: &maps.0[at].1 };
+        Ok(filtered.render(&scene.camera, size, lookups, plan.observer)?)
     }
 
     /// Both.
