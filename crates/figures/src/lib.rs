@@ -32,7 +32,7 @@ pub enum Paper {
 }
 
 impl Paper {
-    /// Every paper, by date but for the last two.
+    /// Every paper, in the order of the page.
     pub const ALL: [Self; 4] = [Self::Tan, Self::Han, Self::Olano, Self::Leadr];
 
     /// Authors, year and title.

@@ -7,6 +7,7 @@ use minijinja::{Environment, context};
 use ndfmap::Error;
 use ndfmap::draw::Theme;
 use ndfmap::maps::atomic;
+use ndfmap::render::Device;
 use serde::Serialize;
 
 use crate::{Claim, Drawing, Figure, Paper, Plan, TABLE, Verdict};
@@ -19,7 +20,7 @@ pub const PAGE: &str = "index.html";
 pub struct Made {
     /// Name of the figure.
     pub figure: &'static str,
-    /// Paper and place.
+    /// Paper.
     pub paper: &'static str,
     /// Place in the paper.
     pub place: &'static str,
@@ -64,13 +65,14 @@ pub fn write(figure: &Figure, plan: &Plan<'_>, folder: &Path) -> Result<(Made, V
         pictures.push(names);
     }
     let seed = if plan.seed == 0 { String::new() } else { format!(" --seed {}", plan.seed) };
+    let device = if matches!(plan.device, Device::Cpu) { "" } else { " --device gpu" };
     let quick = if plan.quick { " --quick" } else { "" };
     let made = Made {
         figure: figure.name,
         paper: figure.paper.title(),
         place: figure.place,
         summary: figure.summary,
-        command: format!("ndfmap figure {}{quick}{seed} -o DIR", figure.name),
+        command: format!("ndfmap figure {}{quick}{seed}{device} -o DIR", figure.name),
         quick: plan.quick,
         seed: plan.seed,
         verdict: Verdict::of(&claims),

@@ -7,11 +7,11 @@ use ndfmap::scene::Effort;
 
 /// Plan that figures are drawn by.
 pub struct Plan<'a> {
-    /// True for small pictures and maps: a look at every figure in a minute, with numbers that are rough.
+    /// True for small pictures and maps: a look at every figure in a minute or two, with numbers that are rough.
     pub quick: bool,
     /// Seed of the truths' rays.
     pub seed: u64,
-    /// Device of frame rates; all else is made on the processor.
+    /// Device of `tan-speed`'s frame rates; all else is made on the processor.
     pub device: &'a Device,
     /// Observer of progress, who may cancel.
     pub observer: &'a dyn Observer,

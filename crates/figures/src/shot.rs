@@ -200,10 +200,14 @@ pub(crate) fn shown(picture: &Picture, exposure: f32) -> Grid<Rgb> {
 }
 
 /// Sheet of views: truth and every method, with their differences.
-pub(crate) fn sheet(title: impl Into<String>, maps: &Maps, all: &[Shown]) -> Sheet {
+pub(crate) fn sheet<'a>(
+    title: impl Into<String>,
+    names: impl IntoIterator<Item = &'a str>,
+    all: &[Shown],
+) -> Sheet {
     let pairs = all.iter().flat_map(|shown| shown.pictures.iter().map(|picture| (picture, &shown.truth)));
     let colours = DifferenceColours::of(pairs, all.first().map_or(1.0, |shown| shown.exposure));
-    let columns = std::iter::once("truth").chain(maps.names()).map(str::to_owned).collect();
+    let columns = std::iter::once("truth").chain(names).map(str::to_owned).collect();
     Sheet {
         title: title.into(),
         columns,

@@ -24,6 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         truth: None,
         sparkle: false,
         keep: true,
+        keep_drift: false,
     };
     let report = render(&job, &Device::Cpu, &Unobserved, &mut |_, _| Ok(()))?;
     let frame = &report.frames[0];

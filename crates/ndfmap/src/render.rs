@@ -37,6 +37,8 @@ pub struct RenderJob<'a> {
     pub sparkle: bool,
     /// True to keep every frame's pictures, for a contact sheet; a film would fill the memory.
     pub keep: bool,
+    /// True to keep the first frame's pictures of the drift, where sparkle is measured.
+    pub keep_drift: bool,
 }
 
 /// Frame, rendered: measures of the truth, where asked for, and of each method.
@@ -54,7 +56,7 @@ pub struct Frame {
     /// Picture of the truth, where there is one, then of each method; empty when they are not kept.
     pub pictures: Vec<Picture>,
     /// Pictures of the drift, of the truth and of each method, where sparkle is measured; empty when they are
-    /// not kept.
+    /// not kept, and after the first frame.
     pub drifts: Vec<Vec<Picture>>,
 }
 
@@ -215,12 +217,11 @@ fn render_on<E: Engine>(
         if at > 0 && job.scene.moves() {
             scene = job.scene.build(*time, observer)?;
         }
-        let shot = Shot { engine, job, observer, scene: &scene, time: *time };
+        let shot = Shot { engine, job, observer, scene: &scene, time: *time, first: at == 0 };
         let mut frame = shot.frame(&baked)?;
         each(at, &frame)?;
         if !job.keep {
             frame.pictures = Vec::new();
-            frame.drifts = Vec::new();
         }
         frames.push(frame);
     }
@@ -235,12 +236,15 @@ struct Shot<'a, E> {
     observer: &'a dyn Observer,
     scene: &'a Scene,
     time: f64,
+    /// True for the first frame.
+    first: bool,
 }
 
 impl<E: Engine> Shot<'_, E> {
     fn frame(&self, baked: &[E::Maps]) -> Result<Frame, Error> {
-        let Self { engine, job, observer, scene, time } = *self;
+        let Self { engine, job, observer, scene, time, .. } = *self;
         let (size, exposure) = (job.size, scene.exposure);
+        let keep_drift = job.keep_drift && self.first;
         let set = engine.set(scene, size)?;
         let view = View { scene, set: &set, camera: scene.camera, size };
         let start = Instant::now();
@@ -266,7 +270,7 @@ impl<E: Engine> Shot<'_, E> {
             Ok((true_change(&halves, exposure), mixed(&halves, 1.0)))
         };
         let (drifting, true_drift) = job.truth.filter(|_| job.sparkle).map(drift).transpose()?.unzip();
-        let mut drifts: Vec<Vec<Picture>> = true_drift.filter(|_| job.keep).into_iter().collect();
+        let mut drifts: Vec<Vec<Picture>> = true_drift.filter(|_| keep_drift).into_iter().collect();
         let result = |maps: &E::Maps| -> Result<(MethodResult, Picture), Error> {
             observer.begin("filtered");
             // Every picture of a drift is a part of the same work.
@@ -284,7 +288,7 @@ impl<E: Engine> Shot<'_, E> {
                     |i| draw(&View { camera: drifted(&scene.camera, i), ..view }, 1 + i).map(|d| d.picture);
                 let pictures = (0..DRIFT_FRAMES).map(moved).collect::<Result<Vec<Picture>, _>>()?;
                 let sparkle = change(&pictures, exposure) / drifting.change.max(f64::MIN_POSITIVE);
-                drifts.extend(job.keep.then_some(pictures));
+                drifts.extend(keep_drift.then_some(pictures));
                 Ok(sparkle)
             };
             let sparkle = drifting.map(&mut sparkle).transpose()?;

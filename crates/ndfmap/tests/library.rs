@@ -36,6 +36,7 @@ fn job<'a>(scene: &'a SceneSpec, methods: &'a [AnyMethod]) -> RenderJob<'a> {
         truth: Some(Effort::rays(32)),
         sparkle: true,
         keep: false,
+        keep_drift: false,
     }
 }
 

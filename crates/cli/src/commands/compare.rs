@@ -256,6 +256,7 @@ impl Run<'_> {
             truth: Some(pictures.truth),
             sparkle: pictures.sparkle,
             keep: true,
+            keep_drift: pictures.sparkle,
         };
         render(&job, &Device::Cpu, terminal, &mut |_, _| Ok(()))
     }

@@ -57,6 +57,7 @@ fn sheet(scene: &str, times: &[f64], terminal: &Terminal) -> Result<Vec<u8>, Err
         truth: Some(Effort { rays: 128, noise: 0.0, seed: 0 }),
         sparkle: false,
         keep: true,
+        keep_drift: false,
     };
     contact_sheet(&render(&job, &Device::Cpu, terminal, &mut |_, _| Ok(()))?, scene, Theme::Light)
 }

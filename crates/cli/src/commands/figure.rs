@@ -39,7 +39,7 @@ pub(super) struct FigureCommand {
     /// Seed of the truths' rays
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Device whose frame rates are measured; all else is made on the processor
+    /// Device whose frame rates `tan-speed` measures; all else is made on the processor
     #[arg(long, value_enum, ignore_case = true, default_value_t = Device::Cpu)]
     device: Device,
 }
@@ -81,6 +81,12 @@ impl FigureCommand {
         let chosen: Vec<&Figure> =
             TABLE.iter().filter(|row| self.all || self.name.iter().any(|name| name == row.name)).collect();
         make_folder(&folder)?;
+        // Before the work, which takes minutes.
+        for row in &chosen {
+            for ending in ["json", "png"] {
+                make_way(&folder.join(format!("{}.{ending}", row.name)))?;
+            }
+        }
         if self.all {
             check_kept(&folder.join(PAGE))?;
         }
@@ -88,7 +94,6 @@ impl FigureCommand {
         let plan = Plan { quick: self.quick, seed: self.seed, device: &device, observer: &terminal };
         let (mut made, mut written): (Vec<Made>, Vec<PathBuf>) = (Vec::new(), Vec::new());
         for row in chosen {
-            check_kept(&folder.join(format!("{}.json", row.name)))?;
             terminal.check()?;
             let (one, files) = write(row, &plan, &folder)?;
             say(format_args!("{}: {}, {:.1} s", row.name, one.verdict, one.seconds));

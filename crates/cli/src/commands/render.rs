@@ -395,6 +395,7 @@ impl Render {
             }),
             sparkle: self.sparkle,
             keep: self.compare.is_some(),
+            keep_drift: false,
         };
         if job.keep {
             let sheet = SheetPlan::new(self.size, self.truth.is_some(), methods.len(), times.len()).size();

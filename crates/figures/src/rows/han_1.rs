@@ -27,7 +27,7 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
     let mut row = SurfaceRow::flat(size.width);
     surface.read_row(0, &mut row);
     let shades = |n: glam::Vec3| -> Rgb { [n.x, n.y, n.z].map(|v| ((v + 1.0) * 127.5).round() as u8) };
-    // A groove and its neighbours.
+    // Two grooves.
     let near = Grid::from_fn(Size { width: 16, height: 16 }, |x, _| shades(row.normal(x * size.width / 64)));
     let last = ndfmap::core::pyramid::level_sizes(size).len() - 1;
     let texel = Texel { level: last, x: 0, y: 0 };
@@ -50,7 +50,7 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
     rows[0].panels.push(Some(close));
     let columns = ["truth", "average normal", "two lobes", "closeup"].map(str::to_owned).to_vec();
     let title = "A V-groove under one texel, seen from above".to_owned();
-    let comparison = compared(plan, surface, BRDF, &names, false)?;
+    let comparison = compared(plan, surface, BRDF, &names)?;
     let error = |at: usize| comparison.rows[at].levels[last].error;
     let claims = vec![
         Claim::number("error of the average normal, as wrong as black or worse", error(0))

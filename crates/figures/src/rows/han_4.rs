@@ -39,7 +39,7 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
         }
     }
     Ok(Drawing {
-        sheets: vec![sheet("Measured materials", &maps, &all)],
+        sheets: vec![sheet("Measured materials", maps.names(), &all)],
         claims,
         why: "The truth is the material itself; pictures are shaded by its factors, as the paper proposes, so that \
               their errors hold those of factoring too.",

@@ -27,7 +27,7 @@ const PEN: &str = "blinn-phong:300";
 fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
     let spec = scene("sphere", plan.map(512));
     let first = spec.build(0.0, plan.observer)?;
-    let maps = Maps::bake(plan, &first, &["vmf:6"])?;
+    let maps = Maps::bake(plan, &first, &["vmf:6", "naive"])?;
     let surface = &*first.materials[0].map;
     let toksvig: &AnyMethod = &methods(&["toksvig"])[0];
     let means = baked(plan, surface, toksvig)?;
@@ -60,11 +60,14 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
             glam::Vec3::new(mean[0], mean[1], mean[2]).length()
         };
         lengths.push((0..count).map(|i| f64::from(length(i))).sum::<f64>() / count as f64);
-        claims.push(Claim::number(format!("time {time}: L2 error of vmf:6"), shot.l2(0)));
+        let (ours, naive) = (shot.l2(0), shot.l2(1));
+        let says = format!("time {time}: L2 error of vmf:6, below that of average normals");
+        claims.push(Claim::number(says, ours).holds(ours < naive));
+        claims.push(Claim::number(format!("time {time}: L2 error of average normals"), naive));
     }
     for (time, pair) in TIMES[1..].iter().zip(lengths.windows(2)) {
-        let says = format!("time {time}: mean length of the normals under a pixel, no longer than before");
-        claims.push(Claim::number(says, pair[1]).holds(pair[1] <= pair[0] + 1e-3));
+        let says = format!("time {time}: mean length of the normals under a pixel");
+        claims.push(Claim::number(says, pair[1]));
     }
     let heads = ["truth", "vmf:6", "normals", "effective BRDF"];
     let row = |(head, panels): (&str, Vec<Option<Panel>>)| SheetRow { head: vec![head.to_owned()], panels };

@@ -67,10 +67,7 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
         (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for count in LOBES {
         let [gmm, vmf]: [AnyMethod; 2] = {
-            let both = methods(&[
-                &format!("gmm:{count}:unaligned:printed"),
-                &format!("vmf:{count}:unaligned:printed"),
-            ]);
+            let both = methods(&[&format!("gmm:{count}:unaligned"), &format!("vmf:{count}:unaligned")]);
             both.try_into().unwrap_or_else(|_| unreachable!("two methods"))
         };
         let (on_plane, on_sphere) = (baked(plan, surface, &gmm)?, baked(plan, surface, &vmf)?);
@@ -116,7 +113,8 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
             scale: None,
         }],
         claims,
-        why: "Fits are those of the two papers as printed, each texel by itself, of hemispherical scales whose \
-              normals reach to the rim. The paper prints no number; the bounds are ours.",
+        why: "Lobes are fitted to each texel by itself, in the plane as Tan et al. do and on the \
+              sphere as Han et al. do, and widened by the same reflectance. The map is armour of \
+              hemispherical scales. The paper prints no number; the bounds are ours.",
     })
 }

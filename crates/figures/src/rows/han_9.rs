@@ -44,7 +44,7 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
         }
     }
     Ok(Drawing {
-        sheets: vec![sheet("A creature in a studio", &maps, &all)],
+        sheets: vec![sheet("A creature in a studio", maps.names(), &all)],
         claims,
         why: "A mesh of our own for the armadillo. The paper prints no number but the order. Rows below the \
               harmonics have cubes blurred ahead of time, which renderers use today.",

@@ -4,7 +4,7 @@ use ndfmap::Error;
 use ndfmap::core::grid::Size;
 use ndfmap::draw::{Axis, Line, Panel, Plot, Sheet, SheetRow};
 
-use super::texels::{builtin, compared};
+use super::texels::{builtin, compared, mean_error};
 use crate::{Claim, Drawing, Figure, Paper, Plan};
 
 pub(crate) const ROW: Figure = Figure {
@@ -37,12 +37,8 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let (mut lines, mut claims, mut errors) = (Vec::new(), Vec::new(), Vec::new());
     for (brdf, name) in LOBES {
-        let comparison = compared(plan, &*map.surface, brdf, &names, false)?;
-        let mean = |at: usize| {
-            let levels = comparison.rows[at].levels.iter().filter(|l| LEVELS.contains(&l.level));
-            let errors: Vec<f64> = levels.map(|l| l.error).collect();
-            errors.iter().sum::<f64>() / errors.len().max(1) as f64
-        };
+        let comparison = compared(plan, &*map.surface, brdf, &names)?;
+        let mean = |at: usize| mean_error(&comparison.rows[at], &LEVELS);
         let of_order: Vec<f64> = (0..ORDERS.len()).map(mean).collect();
         let points = ORDERS.iter().zip(&of_order).map(|(order, error)| [*order as f64, *error]).collect();
         lines.push(Line { name: name.to_owned(), points, dashed: false });
@@ -71,11 +67,12 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
     );
     for ((_, name), (errors, paper)) in LOBES.iter().zip(errors.iter().zip([64.0, 64.0, 200.0])) {
         let terms = enough(errors);
-        if terms.is_finite() {
-            claims.push(
-                Claim::number(format!("{name}: terms until the error is 0.05 or less"), terms).beside(paper),
-            );
-        }
+        claims.push(if terms.is_finite() {
+            Claim::number(format!("{name}: terms until the error is 0.05 or less"), terms).beside(paper)
+        } else {
+            let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
+            Claim::number(format!("{name}: least error of all orders, none enough"), least)
+        });
     }
     let bound = Line { name: "enough".to_owned(), points: vec![[2.0, ENOUGH], [16.0, ENOUGH]], dashed: true };
     lines.push(bound);

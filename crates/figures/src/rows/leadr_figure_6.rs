@@ -19,7 +19,7 @@ pub(crate) const ROW: Figure = Figure {
     name: "leadr-figure-6",
     paper: Paper::Leadr,
     place: "Figure 6",
-    summary: "silhouettes where mean normals face away, without and with the artificial normal",
+    summary: "silhouettes where mean normals face away, by the printed division and by ours",
     draw,
 };
 
@@ -77,18 +77,24 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
         })
     });
     let rows = vec![SheetRow { head: Vec::new(), panels: shown.collect() }];
-    let columns = ["without, as printed", "with the artificial normal"].map(str::to_owned).to_vec();
+    let columns = ["printed form", "exact area, artificial normal"].map(str::to_owned).to_vec();
     let title = "A rough sphere lit from the eye; undefined pixels are pink".to_owned();
     let claims = vec![
-        Claim::number(format!("undefined pixels of {PICTURES} pictures, without: some"), undefined[0] as f64)
-            .holds(undefined[0] > 0),
-        Claim::number("the same with the artificial normal: none", undefined[1] as f64)
+        Claim::number(
+            format!("undefined pixels of {PICTURES} pictures by the printed form: some"),
+            undefined[0] as f64,
+        )
+        .holds(undefined[0] > 0),
+        Claim::number("the same by the exact area with the artificial normal: none", undefined[1] as f64)
             .holds(undefined[1] == 0),
     ];
     Ok(Drawing {
         sheets: vec![Sheet { title, columns, rows, scale: None }],
         claims,
-        why: "A pixel is undefined that the sphere covers and that sends nothing, or no number. The pair is the turn \
-              with the most of them.",
+        why: "A pixel is undefined that the sphere covers and that sends nothing, or no number; \
+              the pair is the turn with the most of them. The printed form divides by the \
+              projected area of the mean normal, without the artificial normal; ours divides by \
+              the exact area of all facets that are seen, with it. The paper shows its sampling \
+              schemes, this is a light from the eye.",
     })
 }

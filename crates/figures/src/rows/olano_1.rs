@@ -59,17 +59,14 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
         (0..size.area()).map(of).fold(DMat3::ZERO, |sum, c| sum + c) * (1.0 / size.area() as f64)
     };
     let (fine, coarse) = (spread(0), spread(level));
-    let axes = |c: &DMat3| {
-        let (xx, yy, xy) = (c.x_axis.x, c.y_axis.y, c.x_axis.y);
-        let (middle, part) = (0.5 * (xx + yy), (0.25 * (xx - yy).powi(2) + xy * xy).sqrt());
-        [(middle + part).max(0.0).sqrt(), (middle - part).max(0.0).sqrt()]
-    };
-    let ([widest, _], [across, along]) = (axes(&fine), axes(&coarse));
+    // The ripples' crests run along y, and their normals lean along x.
+    let deviation = |variance: f64| variance.max(0.0).sqrt();
+    let (across, along) = (deviation(coarse.x_axis.x), deviation(coarse.y_axis.y));
+    let place = format!("under one of {} × {} texels", all.width, all.height);
     let claims = vec![
-        Claim::number("deviation of the normals under one texel, own scale", widest),
-        Claim::number(format!("the same under one of {} × {} texels, larger", all.width, all.height), across)
-            .holds(across > widest),
-        Claim::number("deviation along the ripples, less than two thirds of that across", along)
+        Claim::number("deviation of the normals under one texel, own scale", deviation(fine.x_axis.x)),
+        Claim::number(format!("{place}: deviation across the ripples"), across),
+        Claim::number(format!("{place}: deviation along them, less than two thirds of that across"), along)
             .holds(along < across / 1.5),
     ];
     let columns = ["normal distribution map", "average normals"].map(str::to_owned).to_vec();

@@ -142,13 +142,17 @@ fn scene_of(plan: &Plan<'_>, cells: (usize, usize), shading: Shading) -> Result<
     Ok(scene)
 }
 
-/// Relative L2 error over pixels that both pictures cover: silhouettes are the polygons' own.
+/// Relative L2 error over pixels that both pictures cover, neighbours and all: outlines are the polygons' own.
 fn inside(a: &Picture, truth: &Picture, background: Vec3) -> f64 {
+    let Size { width, height } = truth.size();
     let (mut difference, mut norm) = (0.0, 0.0);
-    for (a, t) in a.texels().iter().zip(truth.texels()) {
-        if *a != background && *t != background {
-            difference += f64::from((*a - *t).length_squared());
-            norm += f64::from(t.length_squared());
+    for y in 1..height - 1 {
+        for x in 1..width - 1 {
+            let around = || (y - 1..=y + 1).flat_map(move |y| (x - 1..=x + 1).map(move |x| (x, y)));
+            if around().all(|(x, y)| a.row(y)[x] != background && truth.row(y)[x] != background) {
+                difference += f64::from((a.row(y)[x] - truth.row(y)[x]).length_squared());
+                norm += f64::from(truth.row(y)[x].length_squared());
+            }
         }
     }
     (difference / f64::max(norm, f64::MIN_POSITIVE)).sqrt()

@@ -65,7 +65,7 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
     Ok(Drawing {
         sheets: vec![Sheet { title: "Two points of a shiny bump".to_owned(), columns, rows, scale: None }],
         claims,
-        why: "Means and second moments mix as the paper says, to what half floats hold. One Gaussian fills the gap \
-              between two directions that are far apart; mixtures of lobes do not.",
+        why: "Means and second moments mix as the paper says, to what half floats hold. One \
+              Gaussian fills the gap between two directions that are far apart.",
     })
 }

@@ -42,10 +42,10 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
         all.push(shown);
     }
     Ok(Drawing {
-        sheets: vec![sheet("A desert at three distances", &maps, &all)],
+        sheets: vec![sheet("A desert at three distances", maps.names(), &all)],
         claims,
-        why: "The paper shows photographs beside its pictures, and no number. Sand is nearly matte, so little is lost \
-              by leaving its reflectance fixed; distances in the plane of planar lobes are no angles on the steep \
-              dunes under a low sun, and spherical lobes have no such trouble.",
+        why: "The paper shows photographs beside its pictures, and no number. Planar lobes, the \
+              paper's, lose to a fixed reflectance up close and win from afar; spherical lobes \
+              stand beside them.",
     })
 }

@@ -57,7 +57,7 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
     Ok(Drawing {
         sheets,
         claims,
-        why: "The paper draws one corner and prints no number; errors here are means over levels 2 to 5. Lobes that \
-              were fitted apart serve a texel by itself best, and a filter worst.",
+        why: "The paper draws one corner and prints no number; errors here are means over levels 2 \
+              to 5.",
     })
 }

@@ -28,9 +28,8 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
         below("colour error, aligned by ours", 2),
     ];
     Ok(Drawing {
-        sheets: vec![sheet("Alignment of mixtures", &maps, &[shown])],
+        sheets: vec![sheet("Alignment of mixtures", maps.names(), &[shown])],
         claims,
-        why: "The paper prints no number here. Where a filter mixes lobes that do not belong together, carved lines \
-              fray; alignment mends that.",
+        why: "The paper prints no number here, and says that details are lost without alignment.",
     })
 }

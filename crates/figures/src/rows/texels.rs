@@ -1,8 +1,10 @@
 //! Distributions of normals under one texel, and the lobes that methods make of them.
 
+use std::ops::RangeInclusive;
+
 use glam::DVec3;
 use ndfmap::Error;
-use ndfmap::compare::{Comparison, Subject, compare};
+use ndfmap::compare::{Comparison, Row, Subject, compare};
 use ndfmap::core::bake::Bake;
 use ndfmap::core::brdf::AnyLobe;
 use ndfmap::core::measure::TexelTruth;
@@ -44,7 +46,6 @@ pub(crate) fn compared(
     surface: &dyn Surface,
     brdf: &str,
     spellings: &[&str],
-    filtering: bool,
 ) -> Result<Comparison, Error> {
     let subject = Subject {
         name: "map",
@@ -53,7 +54,7 @@ pub(crate) fn compared(
         methods: &methods(spellings),
         baked: &[],
         precision: Precision::Half,
-        filtering,
+        filtering: false,
     };
     compare(&subject, plan.observer)
 }
@@ -100,4 +101,10 @@ pub(crate) fn apart(a: &[f64], truth: &[f64]) -> f64 {
 /// Largest of a lobe's values.
 pub(crate) fn peak(values: &[f64]) -> f64 {
     values.iter().copied().fold(1e-12, f64::max)
+}
+
+/// Mean error of a method over levels.
+pub(crate) fn mean_error(row: &Row, levels: &RangeInclusive<usize>) -> f64 {
+    let errors: Vec<f64> = row.levels.iter().filter(|l| levels.contains(&l.level)).map(|l| l.error).collect();
+    errors.iter().sum::<f64>() / errors.len().max(1) as f64
 }

@@ -82,7 +82,7 @@ impl Axis {
             v => {
                 let digits = (1.0 - v.log10().floor()).clamp(1.0, 5.0) as usize;
                 let text = format!("{value:.digits$}");
-                text.trim_end_matches('0').to_owned()
+                text.trim_end_matches('0').trim_end_matches('.').to_owned()
             }
         }
     }
@@ -238,5 +238,6 @@ mod tests {
             ["0", "0.5", "2", "0.25", "250", "1e-4"]
         );
         assert_eq!([-1.0, 0.0, 2.0, -0.5].map(|v| axis(true).tick(v)), ["0.1", "1", "100", "0.32"]);
+        assert_eq!([axis(true).tick(0.3), axis(false).tick(10.04)], ["2", "10"]);
     }
 }

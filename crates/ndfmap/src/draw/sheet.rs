@@ -9,8 +9,9 @@ use super::text::{Style, width};
 /// Gap around panels, in pixels.
 const GAP: usize = 14;
 
-/// Width of a scale's ramp, and of its ticks' labels, in pixels.
+/// Width and height of a scale's ramp, in pixels.
 const RAMP: usize = 16;
+const RAMP_HEIGHT: usize = 180;
 
 /// Sheet of panels.
 #[derive(Clone, Default)]
@@ -149,6 +150,8 @@ impl Sheet {
         if let Some(Scale { title, low, high, .. }) = &self.scale {
             let words = widest(&[low.clone(), high.clone()], Style::CAPTION) + RAMP + 6;
             x += words.max(width(title, Style::CAPTION)) + GAP;
+            let top = rows.first().copied().unwrap_or(y);
+            y = y.max(top + Style::CAPTION.line() + 4 + RAMP_HEIGHT + GAP);
         }
         let width = x.max(width(&self.title, Style::TITLE) + 2 * GAP);
         Layout { size: Size { width, height: y }, columns, rows, heads, scale }
@@ -186,24 +189,23 @@ impl Sheet {
             }
         }
         if let (Some(scale), Some(top)) = (&self.scale, layout.rows.first()) {
-            scale.draw(&mut canvas, (layout.scale, *top), layout.size.height - top);
+            scale.draw(&mut canvas, (layout.scale, *top));
         }
         canvas
     }
 }
 
 impl Scale {
-    fn draw(&self, canvas: &mut Canvas, (x, y): (usize, usize), room: usize) {
+    fn draw(&self, canvas: &mut Canvas, (x, y): (usize, usize)) {
         canvas.text((x, y), &self.title, Style::CAPTION);
         let top = y + Style::CAPTION.line() + 4;
-        let height = 180.min(room.saturating_sub(Style::CAPTION.line() + 2 * GAP)).max(2);
-        for j in 0..height {
-            let colour = (self.colour)(1.0 - j as f64 / (height - 1) as f64);
+        for j in 0..RAMP_HEIGHT {
+            let colour = (self.colour)(1.0 - j as f64 / (RAMP_HEIGHT - 1) as f64);
             (0..RAMP).for_each(|i| canvas.set(x + i, top + j, colour));
         }
         let beside = x + RAMP + 6;
         canvas.text((beside, top), &self.high, Style::CAPTION);
-        canvas.text((beside, top + height - Style::CAPTION.line()), &self.low, Style::CAPTION);
+        canvas.text((beside, top + RAMP_HEIGHT - Style::CAPTION.line()), &self.low, Style::CAPTION);
     }
 }
 

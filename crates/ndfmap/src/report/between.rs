@@ -71,7 +71,7 @@ pub fn corner_sheet(subject: &Subject<'_>, comparison: &Comparison) -> Result<Op
     }))
 }
 
-/// Mixture in the comparison: its row, its method, and the same method unaligned.
+/// Mixture in the comparison: its row, its method, and as many lobes of the kind fitted apart.
 struct Mixture<'a> {
     row: &'a Row,
     method: AnyMethod,

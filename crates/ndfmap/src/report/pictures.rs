@@ -80,13 +80,15 @@ impl SheetPlan {
         Self { picture, has_truth, columns: methods + usize::from(has_truth), frames }
     }
 
-    /// Width and height that the pictures take, in pixels; words and gaps come on top.
+    /// Width and height that the pictures take, in pixels, at the least size that their captions ask for.
     #[must_use]
     pub fn size(&self) -> Size {
         let Size { width, height } = self.picture;
         let times = LEAST_SIDE.div_ceil(width.max(height)).max(1);
         let rows = self.frames * if self.has_truth { 2 } else { 1 };
-        Size { width: self.columns * width * times, height: rows * height * times }
+        // Captions are no wider than the smallest pictures.
+        let [width, height] = [width, height].map(|side| (side * times).max(LEAST_SIDE));
+        Size { width: self.columns * width, height: rows * height }
     }
 }
 

@@ -85,7 +85,6 @@ impl Baked {
     ) -> DVec3 {
         let material = shading.material;
         let params = |lobe: Option<usize>| match (&material.textures, lobe, self.carriers) {
-            (None, ..) => material.params,
             (Some(_), Some(lobe), Some(layout)) => {
                 let attribute = |k: usize| layout.attribute(channels, k, lobe);
                 SurfaceTextures::from_channels(
@@ -94,11 +93,12 @@ impl Baked {
                     material.params.specular,
                 )
             }
-            (Some(_), ..) => SurfaceTextures::from_channels(
+            (Some(_), ..) if !self.params.is_empty() => SurfaceTextures::from_channels(
                 colours[0],
                 (self.params.len() > 1).then_some(colours[1]),
                 material.params.specular,
             ),
+            _ => material.params,
         };
         let texel = FilteredTexel {
             channels: &channels[..4 * self.layers],

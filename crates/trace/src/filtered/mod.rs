@@ -29,7 +29,8 @@ use crate::incident_directions;
 const PARTS: usize = 4;
 
 /// The maps of a scene's materials, baked with one method. Camera, lights, BRDFs, models and meshes may
-/// change afterwards.
+/// change afterwards. Textures are baked too: a material that gets some afterwards keeps the colour of its
+/// parameters.
 pub struct BakedMaps {
     method: AnyMethod,
     materials: Vec<Baked>,
