@@ -81,8 +81,8 @@ fn mixtures_in_an_environment_are_those_of_an_independent_program() {
     let light = FilteredEnvironment::new(&Environment::new(sky).unwrap());
     let method = "vmf:3".parse::<AnyMethod>().unwrap();
     let shine = SurfaceParams { diffuse: DVec3::ZERO, ..WHITE };
-    // Sums over texels of 0.7 degrees in floats, and of 2.8 degrees; at views between those of the table, 22.5
-    // degrees apart, it is interpolated. Measured 4e-6, 4e-4 and 0.03.
+    // Sums over texels of 0.7 degrees in floats, and of 2.8 degrees; at views between those of the table,
+    // 22.5 degrees apart, it is interpolated. Measured 4e-6, 4e-4 and 0.03.
     for (key, eyes, technique, bound) in [
         ("irradiance", &eyes, Technique::Prefiltered, 1e-5),
         ("equation_26_at_views", &views, Technique::Harmonics, 1e-3),

@@ -24,13 +24,13 @@ impl Claim {
         Self { says: says.into(), paper: None, ours, holds: None }
     }
 
-    /// The same beside the paper's number.
+    /// This number beside the paper's.
     #[must_use]
     pub fn beside(self, paper: f64) -> Self {
         Self { paper: Some(paper), ..self }
     }
 
-    /// The same, judged.
+    /// This number, judged.
     #[must_use]
     pub fn holds(self, holds: bool) -> Self {
         Self { holds: Some(holds), ..self }

@@ -7,7 +7,8 @@ use ndfmap::scene::Effort;
 
 /// Plan that figures are drawn by.
 pub struct Plan<'a> {
-    /// True for small pictures and maps: a look at every figure in a minute or two, with numbers that are rough.
+    /// True for small pictures and maps: a look at every figure in a minute or two, with numbers that are
+    /// rough.
     pub quick: bool,
     /// Seed of the truths' rays.
     pub seed: u64,

@@ -1,5 +1,5 @@
-//! Every figure, drawn quickly: it has pictures that can be judged, numbers that are numbers, and files that are
-//! whole.
+//! Every figure, drawn quickly: it has pictures that can be judged, numbers that are numbers, and files that
+//! are whole.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
 

@@ -13,8 +13,8 @@ pub(crate) struct Paint {
     pub(crate) specular: f32,
 }
 
-/// Colour of each texel by its normal and its height; the height is 0 where the map is lowest and 1 where it is
-/// highest.
+/// Colour of each texel by its normal and its height; the height is 0 where the map is lowest and 1 where it
+/// is highest.
 pub(crate) fn painted(
     surface: &dyn Surface,
     Paint { diffuse, specular }: Paint,

@@ -1,4 +1,5 @@
-//! Dupuy et al., supplemental, figure 5: the filter that a grid of slopes reconstructs, and one that is drawn.
+//! Dupuy et al., supplemental, figure 5: the filter that a grid of slopes reconstructs, and one that is
+//! drawn.
 
 use std::f64::consts::PI;
 
@@ -38,8 +39,8 @@ const VIEWS: [f64; 2] = [10.0, 55.0];
 fn filter(disk: &Disk, g: &SlopeGaussian, grid: &SlopeGrid, wo: DVec3) -> Vec<f64> {
     let mut values = vec![0.0; disk.lattice.len()];
     for facet in g.mirrored(grid, wo, SIDE) {
-        // A texel of a cube of `side` spans pi/(2 side), as the paper counts; a point of the disk is wider than
-        // the finest.
+        // A texel of a cube of `side` spans pi/(2 side), as the paper counts; a point of the disk is wider
+        // than the finest.
         let width = (PI / (2.0 * SIDE as f64) * facet.lod.max(0.0).exp2()).clamp(3.0 / POINTS as f64, PI);
         // The tent's integral over the sphere.
         let whole = 2.0 * PI * (1.0 - width.sin() / width);

@@ -264,8 +264,8 @@ impl Table {
         (self.case == Case::Mirror).then(|| Claim::number(says, rough / smooth).holds(rough > smooth))
     }
 
-    /// Statements of the paper's discussion: which numbers of slopes are enough, and which way of placing them
-    /// is better.
+    /// Statements of the paper's discussion: which numbers of slopes are enough, and which way of placing
+    /// them is better.
     fn judged(&self, place: &str, (maps, pictures, truth): (&Maps, &[Picture], &Picture)) -> Vec<Claim> {
         let of = |name: &str| maps.names().position(|n| n == name).map(|at| &pictures[at]);
         let error = |name: &str| of(name).map(|p| relative_l2(p, truth));

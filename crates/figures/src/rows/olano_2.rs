@@ -50,7 +50,8 @@ fn along(s: f64, t: f64) -> [DVec3; 2] {
     [(object(s + h, t) - object(s - h, t)) / (2.0 * h), (object(s, t + h) - object(s, t - h)) / (2.0 * h)]
 }
 
-/// Normal of the object where the line from `place` along `normal` meets it, by Newton's method from `(s, t)`.
+/// Normal of the object where the line from `place` along `normal` meets it, by Newton's method from `(s,
+/// t)`.
 fn met(place: DVec3, normal: DVec3, (mut s, mut t): (f64, f64)) -> DVec3 {
     let mut far = 0.0;
     for _ in 0..8 {
@@ -142,7 +143,8 @@ fn scene_of(plan: &Plan<'_>, cells: (usize, usize), shading: Shading) -> Result<
     Ok(scene)
 }
 
-/// Relative L2 error over pixels that both pictures cover, neighbours and all: outlines are the polygons' own.
+/// Relative L2 error over pixels that both pictures cover, neighbours and all: outlines are the polygons'
+/// own.
 fn inside(a: &Picture, truth: &Picture, background: Vec3) -> f64 {
     let Size { width, height } = truth.size();
     let (mut difference, mut norm) = (0.0, 0.0);

@@ -16,8 +16,8 @@ pub(crate) const ROW: Figure = Figure {
 
 fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
     let scene = scene("disk-oblique", plan.map(512)).build(0.0, plan.observer)?;
-    // Sums of Gaussians pass through an anisotropic filter, as the paper says of its own; peaks are shaded where
-    // they are stored and mixed by three weights.
+    // Sums of Gaussians pass through an anisotropic filter, as the paper says of its own; peaks are shaded
+    // where they are stored and mixed by three weights.
     let shot = Shot::new(plan, &scene, plan.picture(400));
     let anisotropic = Shot { lookups: Lookups::taps(Filtering::anisotropic(16)), ..shot };
     let trilinear = Shot { lookups: Lookups::TRILINEAR, ..shot };

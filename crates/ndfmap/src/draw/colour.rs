@@ -19,8 +19,8 @@ pub fn heat(t: f64) -> Rgb {
 /// Colours of a plot's lines: as many as there are lines, no two alike.
 ///
 /// Up to seven are Okabe and Ito's, which the colour-blind can tell apart, without black and yellow, which
-/// vanish on dark and on light paper. More are hues in even steps around the circle of `OKLCh` (Ottosson 2020),
-/// light and dark by turns.
+/// vanish on dark and on light paper. More are hues in even steps around the circle of `OKLCh` (Ottosson
+/// 2020), light and dark by turns.
 #[must_use]
 pub fn line_colours(lines: usize) -> Vec<Rgb> {
     const FEW: [Rgb; 7] = [

@@ -79,7 +79,7 @@ impl Panel {
         Self { content: Content::Plot(plot), captions: Vec::new() }
     }
 
-    /// The same with captions.
+    /// This panel with captions.
     #[must_use]
     pub fn said(self, captions: impl IntoIterator<Item = String>) -> Self {
         Self { captions: captions.into_iter().collect(), ..self }

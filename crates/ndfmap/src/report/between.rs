@@ -21,9 +21,9 @@ const LEVEL: usize = 4;
 /// Titles of the columns.
 const COLUMNS: [&str; 4] = ["histogram", "unaligned", "as baked", "each texel shaded"];
 
-/// Sheet with a row for every mixture that was compared: a corner between four texels, by the histogram of its
-/// normals, by lobes that were fitted apart, by those of the comparison, and texel by texel. `None` without a
-/// mixture, or without a corner to look at.
+/// Sheet with a row for every mixture that was compared: a corner between four texels, by the histogram of
+/// its normals, by lobes that were fitted apart, by those of the comparison, and texel by texel. `None`
+/// without a mixture, or without a corner to look at.
 ///
 /// # Errors
 /// [`Error::Cancelled`].

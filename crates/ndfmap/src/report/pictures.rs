@@ -92,8 +92,8 @@ impl SheetPlan {
     }
 }
 
-/// Sheet of a rendering whose pictures were kept: a row a frame, with a second for the differences where there
-/// is a truth.
+/// Sheet of a rendering whose pictures were kept: a row a frame, with a second for the differences where
+/// there is a truth.
 ///
 /// # Errors
 /// [`Error::Request`] for pictures that were not kept.
@@ -157,8 +157,8 @@ pub fn contact_sheet(report: &RenderReport, title: &str, theme: Theme) -> Result
 }
 
 /// Film of a rendering whose drift was kept, as an animated PNG: truth and every method side by side, as the
-/// camera drifts by a pixel. It shows the quarter of the picture in which most changes, enlarged. `None` where
-/// no sparkle was measured.
+/// camera drifts by a pixel. It shows the quarter of the picture in which most changes, enlarged. `None`
+/// where no sparkle was measured.
 ///
 /// # Errors
 /// [`Error::Failed`] for a film that cannot be encoded.
