@@ -52,7 +52,7 @@ fn wrong_requests_are_refused() {
         (&["figure", "tan-4"], "--output"),
         (&["figure", "tan-4", "--all", "-o", "x"], "cannot be used with"),
         (&["figure", "--list", "--all"], "cannot be used with"),
-        (&["figure", "tan-4", "--seed", "-1", "-o", "x"], "--seed"),
+        (&["figure", "tan-4", "--seed", "x", "-o", "x"], "--seed"),
     ] {
         let output = ndfmap(arguments);
         let text = String::from_utf8_lossy(&output.stderr).into_owned();
