@@ -2,8 +2,8 @@
 //! the papers' numbers beside ours.
 //!
 //! [`TABLE`] has a row for each, and a file of `rows` draws each. A figure is a [`Drawing`]: sheets of
-//! labelled panels, [`Claim`]s with both numbers, and a sentence on why they agree or not. [`write()`] puts one
-//! into a folder, [`index`] makes a page of many.
+//! labelled panels, [`Claim`]s with both numbers, and a sentence on why they agree or not. [`write()`] puts
+//! one into a folder, [`index`] makes a page of many.
 
 mod claim;
 mod page;
