@@ -36,7 +36,7 @@ fn a_figure_is_made_with_its_numbers() {
         assert!(figure["command"].as_str().unwrap().contains("--quick"));
     }
     assert!(!folder.path().join("index.html").exists());
-    // The same bytes again, by one thread.
+    // Again by one thread: no byte differs.
     let before = std::fs::read(folder.path().join("han-1.png")).unwrap();
     assert!(ndfmap(&["figure", "han-1", "--quick", "--threads", "1", "-o", path]).status.success());
     assert_eq!(std::fs::read(folder.path().join("han-1.png")).unwrap(), before);

@@ -22,7 +22,8 @@ use crate::voice::say;
 #[command(after_long_help = figures_help())]
 pub(super) struct FigureCommand {
     /// Names of the figures
-    #[arg(value_name = "NAME", value_delimiter = ',', value_parser = figure_name, required_unless_present_any = ["all", "list"])]
+    #[arg(value_name = "NAME", value_delimiter = ',', value_parser = figure_name,
+        required_unless_present_any = ["all", "list"])]
     name: Vec<String>,
     /// List the figures
     #[arg(long, conflicts_with_all = ["name", "all", "output"])]
@@ -83,8 +84,8 @@ impl FigureCommand {
         make_folder(&folder)?;
         // Before the work, which takes minutes.
         for row in &chosen {
-            for ending in ["json", "png"] {
-                make_way(&folder.join(format!("{}.{ending}", row.name)))?;
+            for ending in [".json", ".png", "-dark.png"] {
+                make_way(&folder.join(format!("{}{ending}", row.name)))?;
             }
         }
         if self.all {

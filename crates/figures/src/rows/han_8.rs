@@ -31,7 +31,7 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
     let mut seconds = 0.0;
     for (name, time) in [("wet", 0.0), ("drying", 0.33), ("dry", 0.67)] {
         let mut scene = spec.build(time, plan.observer)?;
-        // What dries is the lobe, and nothing is baked anew.
+        // The lobe dries, and nothing is baked anew.
         let skin = &mut scene.materials[0];
         skin.textures = Some(textures.clone());
         skin.brdf.lobe = skin.brdf.lobe.widen(skin.params.roughness);
