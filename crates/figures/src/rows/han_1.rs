@@ -60,7 +60,7 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
     Ok(Drawing {
         sheets: vec![Sheet { title, columns, rows, scale: None }],
         claims,
-        why: "The paper's figure is a sketch without numbers. Two directions are two lobes; their average is a third \
-              direction, in which nothing faces.",
+        why: "The paper's figure is a sketch without numbers. Two directions are two lobes; their \
+              average is a third direction, in which nothing faces.",
     })
 }

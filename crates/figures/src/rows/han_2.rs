@@ -73,7 +73,8 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
     Ok(Drawing {
         sheets: vec![sheet("Normals coloured by their direction", maps.names(), &all)],
         claims,
-        why: "Crumpled foil in place of the paper's map, a mirror without diffuse light. Lobes carry the mean colour \
-              of their own normals, so that a highlight has the colour of the facets that send it.",
+        why: "Crumpled foil in place of the paper's map, a mirror without diffuse light. Lobes \
+              carry the mean colour of their own normals, so that a highlight has the colour of \
+              the facets that send it.",
     })
 }

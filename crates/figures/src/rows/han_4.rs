@@ -41,7 +41,7 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
     Ok(Drawing {
         sheets: vec![sheet("Measured materials", maps.names(), &all)],
         claims,
-        why: "The truth is the material itself; pictures are shaded by its factors, as the paper proposes, so that \
-              their errors hold those of factoring too.",
+        why: "The truth is the material itself; pictures are shaded by its factors, as the paper \
+              proposes, so that their errors hold those of factoring too.",
     })
 }

@@ -33,7 +33,7 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
     Ok(Drawing {
         sheets: vec![sheet("Cloth in blue fabric", maps.names(), &all)],
         claims,
-        why: "The paper shows stills and no number. The bound of 0.02 is ours; average normals of \
-              this weave in fabric are as near.",
+        why: "The paper shows stills and no number, and says that filtering is correct. The bound \
+              of 0.02 is ours.",
     })
 }

@@ -76,7 +76,7 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
     Ok(Drawing {
         sheets: vec![Sheet { title: "A sphere at four distances".to_owned(), columns, rows, scale: None }],
         claims,
-        why: "Relief becomes reflectance: what a pixel covers grows from one facet to a distribution, and the mean \
-              of its normals shorter. The paper prints no number.",
+        why: "Relief becomes reflectance: what a pixel covers grows from one facet to a \
+              distribution, and the mean of its normals shorter. The paper prints no number.",
     })
 }

@@ -57,7 +57,8 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
     Ok(Drawing {
         sheets: vec![sheet("A creature whose skin dries", maps.names(), &all)],
         claims,
-        why: "A lizard of our own with four maps for the paper's dinosaurs with six. The skin dries by a ramp of \
-              gloss and roughness of our own, not by the model of Sun et al. that the paper cites.",
+        why: "A lizard of our own with four maps for the paper's dinosaurs with six. The skin \
+              dries by a ramp of gloss and roughness of our own, not by the model of Sun et al. \
+              that the paper cites.",
     })
 }

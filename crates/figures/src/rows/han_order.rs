@@ -87,7 +87,7 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
     Ok(Drawing {
         sheets: vec![Sheet { title, columns: Vec::new(), rows, scale: None }],
         claims,
-        why: "Errors are means over levels 2 to 6. The paper does not say which error is enough: 0.05 is our bound, \
-              and orders between those drawn are not tried.",
+        why: "Errors are means over levels 2 to 6. The paper does not say which error is enough: \
+              0.05 is our bound, and orders between those drawn are not tried.",
     })
 }

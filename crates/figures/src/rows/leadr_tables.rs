@@ -249,6 +249,7 @@ fn draw(plan: &Plan<'_>, table: &Table) -> Result<Drawing, Error> {
                 format!("{place}: L2 of the normal map against the displacement"),
                 error(&normal_map),
             ));
+            claims.push(Claim::number(format!("{place}: noise of the displacement's picture"), truth.noise));
             claims.extend(table.judged(&place, (&maps, &pictures, &truth.picture)));
             let nine = maps.names().position(|n| n == "slopes:9");
             spheres.push(Sphere {

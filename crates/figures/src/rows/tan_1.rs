@@ -44,8 +44,7 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
     Ok(Drawing {
         sheets: vec![sheet("A desert at three distances", maps.names(), &all)],
         claims,
-        why: "The paper shows photographs beside its pictures, and no number. Planar lobes, the \
-              paper's, lose to a fixed reflectance up close and win from afar; spherical lobes \
-              stand beside them.",
+        why: "The paper shows photographs beside its pictures, and no number. Judged are planar \
+              lobes, the paper's; spherical ones stand beside them.",
     })
 }
