@@ -132,19 +132,20 @@ fn all_height_maps_load() {
 #[test]
 fn errors_on_real_maps_agree_with_the_independent_program() {
     let Some(data) = data() else { return };
-    // A numpy program's errors at blocks of 64 (level 6): naive, toksvig, slopes, sh:7. It drew 64 random
-    // blocks where we take every texel, which on the smallest of these maps leaves some percent.
+    // A numpy program's errors at blocks of 64 (level 6): naive, toksvig, slopes, sh:7; and a bound on how far
+    // ours may lie. It drew 64 random blocks where we take every texel: measured 3.9, 1.7, 6.2, 3.9, 3.6, 0.6,
+    // 1.4 and 0.4 %.
     let table = [
-        ("ambientcg_Bricks075B_1K_NormalGL.jpg", 50, [1.12, 0.255, 0.466, 0.193]),
-        ("ambientcg_Bricks075B_1K_NormalGL.jpg", 400, [3.78, 0.397, 0.571, 0.389]),
-        ("godot_wool_normal.png", 50, [0.701, 0.165, 0.257, 0.269]),
-        ("godot_wool_normal.png", 400, [2.43, 0.415, 0.489, 0.568]),
-        ("godot_scifi_2_normal.png", 50, [0.991, 0.501, 0.417, 0.426]),
-        ("godot_scifi_2_normal.png", 400, [1.7, 0.802, 0.732, 0.877]),
-        ("bevy_water_normals.png", 50, [3.36, 0.622, 0.365, 0.196]),
-        ("bevy_water_normals.png", 400, [7.78, 0.78, 0.617, 0.518]),
+        ("ambientcg_Bricks075B_1K_NormalGL.jpg", 50, [1.12, 0.255, 0.466, 0.193], 0.045),
+        ("ambientcg_Bricks075B_1K_NormalGL.jpg", 400, [3.78, 0.397, 0.571, 0.389], 0.02),
+        ("godot_wool_normal.png", 50, [0.701, 0.165, 0.257, 0.269], 0.07),
+        ("godot_wool_normal.png", 400, [2.43, 0.415, 0.489, 0.568], 0.045),
+        ("godot_scifi_2_normal.png", 50, [0.991, 0.501, 0.417, 0.426], 0.04),
+        ("godot_scifi_2_normal.png", 400, [1.7, 0.802, 0.732, 0.877], 0.01),
+        ("bevy_water_normals.png", 50, [3.36, 0.622, 0.365, 0.196], 0.02),
+        ("bevy_water_normals.png", 400, [7.78, 0.78, 0.617, 0.518], 0.01),
     ];
-    for (map, s, expected) in table {
+    for (map, s, expected, bound) in table {
         let path = data.join("normal").join(map).display().to_string();
         let lobe = format!("blinn-phong:{s}");
         let told =
@@ -155,7 +156,7 @@ fn errors_on_real_maps_agree_with_the_independent_program() {
                 "{map} s = {s} {method}: {got:.3}, numpy {expected} ({:+.1} %)",
                 (got / expected - 1.0) * 100.0
             );
-            assert!((got / expected - 1.0).abs() < 0.10, "{map} {s} {method}: {got} for {expected}");
+            assert!((got / expected - 1.0).abs() < bound, "{map} {s} {method}: {got} for {expected}");
         }
     }
 }
@@ -163,17 +164,19 @@ fn errors_on_real_maps_agree_with_the_independent_program() {
 #[test]
 fn fitted_lobes_are_at_least_as_good_as_the_independent_program() {
     let Some(data) = data() else { return };
-    // The same program's plain EM from furthest points, at blocks of 64: vmf:1, 2, 4, 6 and gmm:4.
+    // The same program's plain EM from furthest points, at blocks of 64: vmf:1, 2, 4, 6 and gmm:4;
+    // and a bound on ours over its own. Refined lobes of four and six are worse on one map's wide lobes, by up
+    // to 11.6 %; elsewhere ours are the better.
     let table = [
-        ("ambientcg_Bricks075B_1K_NormalGL.jpg", 50, [0.229, 0.144, 0.062, 0.045, 0.085]),
-        ("ambientcg_Bricks075B_1K_NormalGL.jpg", 400, [0.368, 0.234, 0.13, 0.105, 0.141]),
-        ("godot_scifi_2_normal.png", 50, [0.503, 0.265, 0.067, 0.048, 0.108]),
-        ("godot_scifi_2_normal.png", 400, [0.801, 0.421, 0.194, 0.136, 0.189]),
-        ("bevy_water_normals.png", 50, [0.732, 0.52, 0.284, 0.2, 0.411]),
-        ("bevy_water_normals.png", 400, [0.854, 0.698, 0.548, 0.466, 0.659]),
+        ("ambientcg_Bricks075B_1K_NormalGL.jpg", 50, [0.229, 0.144, 0.062, 0.045, 0.085], 1.0),
+        ("ambientcg_Bricks075B_1K_NormalGL.jpg", 400, [0.368, 0.234, 0.13, 0.105, 0.141], 1.0),
+        ("godot_scifi_2_normal.png", 50, [0.503, 0.265, 0.067, 0.048, 0.108], 1.12),
+        ("godot_scifi_2_normal.png", 400, [0.801, 0.421, 0.194, 0.136, 0.189], 1.11),
+        ("bevy_water_normals.png", 50, [0.732, 0.52, 0.284, 0.2, 0.411], 1.003),
+        ("bevy_water_normals.png", 400, [0.854, 0.698, 0.548, 0.466, 0.659], 1.003),
     ];
     let methods = ["vmf:1", "vmf:2", "vmf:4", "vmf:6", "gmm:4"];
-    for (map, s, expected) in table {
+    for (map, s, expected, bound) in table {
         let path = data.join("normal").join(map).display().to_string();
         let lobe = format!("blinn-phong:{s}");
         let told = json(&["compare", &path, "--brdf", &lobe, "--method", &methods.join(","), "--json"]);
@@ -183,9 +186,7 @@ fn fitted_lobes_are_at_least_as_good_as_the_independent_program() {
                 "{map} s = {s} {method}: {got:.3}, numpy {expected} ({:+.1} %)",
                 (got / expected - 1.0) * 100.0
             );
-            // It drew 64 random blocks where we take every texel: up to 6 % on the linear methods, and fits
-            // differ.
-            assert!(got < 1.12 * expected, "{map} {s} {method}: {got} for {expected}");
+            assert!(got < bound * expected, "{map} {s} {method}: {got} for {expected}");
         }
     }
 }
@@ -266,10 +267,9 @@ fn real_environments_light_without_black_or_burnt_pixels() {
             let error = &told["methods"]["vmf:4"]["error"];
             eprintln!("{file} {how}: {error}, noise {}", told["truth"]["noise"]);
             // That it is a picture of the same light: within a twentieth. But Han et al.'s sum over
-            // half-vectors knows of no horizon, and is held at nought where it rings: in the cellar and the
-            // studio, dark but for openings and lamps, it is 18 and 12 % too bright.
-            let dark = file.contains("cellar") || file.contains("studio");
-            let bound = if how == "harmonics" && dark { 0.2 } else { 0.05 };
+            // half-vectors knows of no horizon, and is held at nought where it rings: in the cellar, dark but
+            // for an opening, it is 9.5 % too bright.
+            let bound = if how == "harmonics" && file.contains("cellar") { 0.1 } else { 0.05 };
             assert!((error["brightness"].as_f64().unwrap() - 1.0).abs() < bound, "{file} {how}: {error}");
             let picture = read_image(output.as_ref(), &std::fs::read(&output).unwrap()).unwrap();
             let middle = |x: usize, y: usize| {

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
 
 use glam::{DMat2, DMat3, DVec3, Vec3};
-use ndfmap_core::brdf::{AnyLobe, Brdf, Directions, ShadingModel, SurfaceParams};
+use ndfmap_core::brdf::{AnyLobe, Brdf, Directions, Microfacets, ShadingModel, SurfaceParams};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::SplitSum;
 use ndfmap_core::light::environment::{Environment, FilteredEnvironment, Technique};
@@ -68,17 +68,46 @@ fn displaced_surfaces_are_those_of_an_independent_program() {
     }
 }
 
-#[test]
-fn mixtures_in_an_environment_are_those_of_an_independent_program() {
-    let expected = reference();
-    let (eyes, views) = (directions(&expected["eyes"]), directions(&expected["views"]));
+/// Environment of the script, a polynomial of order 2.
+fn sky() -> FilteredEnvironment {
     let size = Size { width: 512, height: 256 };
     let blank = Environment::new(Grid::from_fn(size, |_, _| Vec3::ZERO)).unwrap();
     let sky = Grid::from_fn(size, |x, y| {
         let w = blank.direction(x as f64 + 0.5, y as f64 + 0.5);
         Vec3::splat((1.0 + 0.5 * w.y + 0.3 * w.z + 0.4 * w.x * w.z) as f32)
     });
-    let light = FilteredEnvironment::new(&Environment::new(sky).unwrap());
+    FilteredEnvironment::new(&Environment::new(sky).unwrap())
+}
+
+#[test]
+fn blurred_cubes_are_those_of_an_independent_program() {
+    let expected = reference();
+    let at: Vec<DVec3> = ["lights", "eyes"].iter().flat_map(|key| directions(&expected[key])).collect();
+    let light = sky();
+    // A level has 64 to 4 texels on a side of the cube, and is linear between them. Measured, Beckmann and GGX:
+    // 3e-4, 2e-3, 6e-3, 9e-3, 0.029 and 1.8e-3, 4e-3, 7e-3, 0.012, 0.032.
+    let bounds = [[5e-4, 3e-3, 8e-3, 0.012, 0.035], [2.5e-3, 5e-3, 9e-3, 0.015, 0.038]];
+    for blur in expected["blurs"].as_array().unwrap() {
+        let ggx = blur["facets"] == "ggx";
+        let cube = light.prefiltered(if ggx { Microfacets::Ggx } else { Microfacets::Beckmann });
+        assert_eq!(cube.levels(), 6);
+        let level = (5.0 * blur["roughness"].as_f64().unwrap()).round();
+        let off = |(w, radiance): (&DVec3, f64)| cube.lookup(*w, level).x / radiance - 1.0;
+        let off: Vec<f64> = at.iter().zip(numbers(&blur["radiance"])).map(off).collect();
+        let largest = off.iter().fold(0.0_f64, |most, off| most.max(off.abs()));
+        let mean = off.iter().sum::<f64>() / off.len() as f64;
+        println!("{} {level}: {largest:.1e}, mean {mean:.1e}", blur["facets"]);
+        assert!(largest < bounds[usize::from(ggx)][level as usize - 1], "{blur}: {largest}");
+        // Coarse texels err both ways: half a percent is left of the widest.
+        assert!(mean.abs() < 0.007, "{blur}: {mean}");
+    }
+}
+
+#[test]
+fn mixtures_in_an_environment_are_those_of_an_independent_program() {
+    let expected = reference();
+    let (eyes, views) = (directions(&expected["eyes"]), directions(&expected["views"]));
+    let light = sky();
     let method = "vmf:3".parse::<AnyMethod>().unwrap();
     let shine = SurfaceParams { diffuse: DVec3::ZERO, ..WHITE };
     // Sums over texels of 0.7 degrees in floats, and of 2.8 degrees; at views between those of the table,

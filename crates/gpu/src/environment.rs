@@ -91,6 +91,10 @@ impl Environments {
         for (to, least) in irradiance.iter_mut().zip(filtered.irradiance.least.to_array()) {
             to.w = least as f32;
         }
+        if environment.technique == Technique::Harmonics {
+            // Before the lock is taken: all threads work it out.
+            irradiance[3].w = filtered.half_vectors().narrowest().get() as f32;
+        }
         let uniform = EnvironmentUniform {
             rotation: [rotation.x_axis, rotation.y_axis, rotation.z_axis]
                 .map(|axis| axis.as_vec3().extend(0.0)),
@@ -99,10 +103,6 @@ impl Environments {
             scale: scale(filtered),
             technique: environment.technique.index(),
         };
-        if environment.technique == Technique::Harmonics {
-            // Before the lock is taken: all threads work it out.
-            let _ = filtered.half_vectors();
-        }
         self.with(environment, |uploaded| {
             if environment.technique == Technique::Harmonics && uploaded.half_vectors.is_none() {
                 let texels: Vec<[f32; 4]> = filtered

@@ -98,8 +98,9 @@ fn over_half_vectors(mu: DVec3, spread: SlopeVariance, printed: bool, local: &Lo
         let rate = (l * if printed { l } else { l + 1 }) as f64;
         local.split_sum.zonal[l] * (-0.5 * rate * spread.get()).exp()
     });
-    let rotation = local.to_environment;
-    local.light.half_vectors().evaluate(rotation * local.wo, rotation * mu, &zonal)
+    let (rotation, light) = (local.to_environment, local.light.half_vectors());
+    let zonal = if printed { zonal } else { light.widened(zonal) };
+    light.evaluate(rotation * local.wo, rotation * mu, &zonal)
 }
 
 /// Light of a Gaussian of slopes.

@@ -6,7 +6,9 @@ Run: python shaded.py > shaded.json. Ten texels and twenty paths of light, of
   shadowed, with Lambda as the Gaussian integral that it is; diffuse facets by the mean over 5 x 5 slopes
   (section 3.6), with its artificial normal (section 3.7);
 - mixtures of three von Mises-Fisher lobes in an environment that is a polynomial of order 2: irradiance by
-  exact zonal factors (Han et al., equation 25), and their equation 26 to order 8 by quadrature.
+  exact zonal factors (Han et al., equation 25), and their equation 26 to order 8 by quadrature;
+- that environment as facets of five roughnesses blur it, seen straight on (Karis 2013): D of the half-vector
+  over the mirror's directions, each by its cosine, by the lobe's zonal factors.
 """
 
 import json
@@ -204,6 +206,25 @@ for _ in range(TEXELS):
     mixtures.append({"channels": channels.flatten().tolist(), "irradiance": irradiance / np.pi,
                      "equation_26": printed[:PATHS].tolist(), "equation_26_at_views": printed[PATHS:].tolist()})
 
-json.dump({"lights": lights.tolist(), "eyes": eyes.tolist(), "views": views.tolist(), "slopes": slopes, "mixtures": mixtures},
-          __import__("sys").stdout)
+# Perceptual roughnesses of the levels of a cube that has six.
+blurs = []
+for name in ["beckmann", "ggx"]:
+    for level in range(1, 6):
+        roughness = level / 5
+        a2 = roughness**4
+        # Over log(1 - u), as peaks are narrow; u is the cosine of the mirror direction.
+        t, dt = np.polynomial.legendre.leggauss(4000)
+        log_fall = (t - 1) / 2 * 40
+        fall = np.exp(log_fall)
+        u = 1 - fall
+        tan2 = fall / (2 - fall)
+        cos4 = ((2 - fall) / 2) ** 2
+        shape = np.exp(-tan2 / a2) if name == "beckmann" else 1 / (a2 + tan2) ** 2
+        measure = shape / cos4 * u * fall * dt
+        factors = [float((eval_legendre(l, u) * measure).sum() / measure.sum()) for l in range(3)]
+        blurs.append({"facets": name, "roughness": roughness,
+                      "radiance": [sums(SKY, w, factors) for w in [*lights, *eyes]]})
+
+json.dump({"lights": lights.tolist(), "eyes": eyes.tolist(), "views": views.tolist(), "slopes": slopes, "mixtures": mixtures,
+           "blurs": blurs}, __import__("sys").stdout)
 print()

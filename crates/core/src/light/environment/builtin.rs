@@ -45,14 +45,15 @@ fn within(w: DVec3, of: [f64; 3], degrees: f64) -> bool {
     w.dot(DVec3::from(of).normalize()) > degrees.to_radians().cos()
 }
 
+/// As bright as the scenes' own lights: white paper that faces the sun sends back 1.
 fn sky(w: DVec3) -> DVec3 {
     if within(w, [0.5, 0.55, 0.7], 0.6) {
-        return DVec3::new(1.0, 0.93, 0.8) * 4e4;
+        return DVec3::new(1.0, 0.93, 0.8) * 8e3;
     }
     if w.y <= 0.0 {
-        return DVec3::new(0.32, 0.26, 0.18) * (1.0 + 0.3 * w.y);
+        return DVec3::new(0.064, 0.052, 0.036) * (1.0 + 0.3 * w.y);
     }
-    DVec3::new(0.75, 0.82, 0.95).lerp(DVec3::new(0.12, 0.25, 0.6), w.y.sqrt())
+    DVec3::new(0.15, 0.164, 0.19).lerp(DVec3::new(0.024, 0.05, 0.12), w.y.sqrt())
 }
 
 fn studio(w: DVec3) -> DVec3 {

@@ -11,8 +11,9 @@ const HARMONICS: u32 = 2u;
 struct Environment {
     // Rotation from directions of the world to the environment's own.
     rotation: mat3x3<f32>,
-    // Nine harmonics of its light, without small bright sources; and in w of the first three, red, green and
-    // blue of the least irradiance that a normal receives.
+    // Nine harmonics of its light, without small bright sources; in w of the first three, red, green and blue
+    // of the least irradiance that a normal receives; in w of the fourth, the least variance of lobes over
+    // half-vectors.
     irradiance: array<vec4<f32>, 9>,
     // Texels on a side of the cubes' finest level, and the number of levels.
     size: vec2<f32>,

@@ -36,6 +36,10 @@ fn half_vector_between(around: ViewsAround, i: u32) -> vec3<f32> {
 // clamped to zero.
 fn over_half_vectors(wo: vec3<f32>, mu: vec3<f32>, spread: f32, printed: bool) -> vec3<f32> {
     let around = views_around(wo);
+    let rate_of_last = 0.5 * f32(HALF_VECTOR_ORDER * (HALF_VECTOR_ORDER + 1u));
+    let left = split_sum_texel(HALF_VECTOR_ORDER, SPLIT_SUM_ENTRIES).x / split_sum_texel(0u, SPLIT_SUM_ENTRIES).x;
+    let own = spread - log(max(left, 1e-30)) / rate_of_last;
+    let widened = select(spread + max(environment.irradiance[3].w - own, 0.0), spread, printed);
     var sum = vec3<f32>(0.0);
     var power = vec2<f32>(1.0, 0.0);
     var diagonal = 0.0;
@@ -45,7 +49,7 @@ fn over_half_vectors(wo: vec3<f32>, mu: vec3<f32>, spread: f32, printed: bool) -
         for (var l = m; l <= HALF_VECTOR_ORDER; l++) {
             let i = l * l + l;
             let rate = f32(l * select(l + 1u, l, printed));
-            let zonal = split_sum_texel(l, SPLIT_SUM_ENTRIES).x * exp(-0.5 * rate * spread);
+            let zonal = split_sum_texel(l, SPLIT_SUM_ENTRIES).x * exp(-0.5 * rate * widened);
             var c = half_vector_between(around, i + m) * power.x;
             if m > 0u {
                 c += half_vector_between(around, i - m) * power.y;
