@@ -17,6 +17,7 @@ mod texels;
 mod tga;
 #[cfg(feature = "tiff")]
 mod tiff;
+mod uastc;
 #[cfg(feature = "webp")]
 mod webp;
 

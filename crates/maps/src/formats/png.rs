@@ -27,13 +27,25 @@ const MAX_DEFLATE_RATIO: usize = 1032;
 /// # Errors
 /// Failure of the encoder, as text.
 pub fn encode(pixels: &[[u8; 3]], size: Size) -> EncodedPicture {
+    encoded(pixels.as_flattened(), size, ColorType::Rgb)
+}
+
+/// PNG file of an 8-bit RGBA picture.
+///
+/// # Errors
+/// Failure of the encoder, as text.
+pub(super) fn encode_rgba(pixels: &[[u8; 4]], size: Size) -> EncodedPicture {
+    encoded(pixels.as_flattened(), size, ColorType::Rgba)
+}
+
+fn encoded(samples: &[u8], size: Size, colour: ColorType) -> EncodedPicture {
     let encode = || {
         let mut bytes = Vec::new();
         let mut encoder = ::png::Encoder::new(&mut bytes, size.width as u32, size.height as u32);
-        encoder.set_color(ColorType::Rgb);
+        encoder.set_color(colour);
         encoder.set_depth(BitDepth::Eight);
         let mut writer = encoder.write_header()?;
-        writer.write_image_data(pixels.as_flattened())?;
+        writer.write_image_data(samples)?;
         writer.finish()?;
         Ok(bytes)
     };

@@ -7,6 +7,7 @@
 
 mod container;
 mod picture;
+mod texture;
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
@@ -19,6 +20,7 @@ use ndfmap_core::grid::Size;
 use ndfmap_core::pyramid::{Layout, Precision, level_sizes};
 
 pub(super) use self::container::Container;
+pub use self::texture::{Texture, TextureEncoding};
 use super::{ChannelLayout, Format, NdfSink, WriteOptions};
 use crate::atomic::AtomicFile;
 use crate::ndf_map::layout_of;
@@ -65,45 +67,74 @@ struct Front {
     length: u64,
 }
 
-impl Front {
-    /// Front for levels of these stored lengths, finest first.
-    fn new(
-        path: &Path,
-        header: &Header,
-        layout: Layout,
-        scheme: Option<SupercompressionScheme>,
-        stored: &[u64],
-    ) -> Result<Self, MapError> {
-        let sizes = level_sizes(layout.size);
+/// Content of a file, as its header tells it.
+#[derive(Debug)]
+struct Content {
+    /// Vulkan's format; `None` for Basis Universal.
+    format: Option<VkFormat>,
+    type_size: u32,
+    /// The one block of the data format descriptor.
+    descriptor: Vec<u8>,
+    size: Size,
+    /// Layers of an array, 0 for a texture that is none.
+    layers: usize,
+    /// Bytes that plain levels are aligned to.
+    alignment: u64,
+    /// Bytes of each level, finest first.
+    levels: Vec<u64>,
+    /// Keys of our own, after the usual ones.
+    keys: Vec<u8>,
+}
+
+impl Content {
+    /// Content of a map.
+    fn of_map(path: &Path, header: &Header, layout: Layout) -> Result<Self, MapError> {
         let format = vk_format(layout.precision);
         let (basic, type_size) =
             Basic::from_format(format).map_err(|e| MapError::unsupported(path, format!("{e:?}")))?;
-        let block = Block::Basic(basic).to_vec();
-        let mut dfd = (block.len() as u32 + 4).to_le_bytes().to_vec();
-        dfd.extend_from_slice(&block);
-        // Keys in the order of their bytes, as the specification asks.
+        Ok(Self {
+            format: Some(format),
+            type_size,
+            descriptor: Block::Basic(basic).to_vec(),
+            size: layout.size,
+            layers: layout.layers,
+            alignment: layout.precision.texel_bytes() as u64,
+            levels: level_sizes(layout.size).iter().map(|size| level_bytes(&layout, *size)).collect(),
+            keys: key_value(KEY, &header.to_json()),
+        })
+    }
+}
+
+impl Front {
+    /// Front for levels of these stored lengths, finest first.
+    fn new(content: &Content, scheme: Option<SupercompressionScheme>, stored: &[u64]) -> Self {
+        let mut dfd = (content.descriptor.len() as u32 + 4).to_le_bytes().to_vec();
+        dfd.extend_from_slice(&content.descriptor);
+        // Keys in the order of their bytes, as the specification asks. There is always one: PlayCanvas waits
+        // for ever for a file without.
         let mut kvd = key_value("KTXorientation", "rd");
         kvd.extend(key_value("KTXwriter", concat!("ndfmap ", env!("CARGO_PKG_VERSION"))));
-        kvd.extend(key_value(KEY, &header.to_json()));
-        let dfd_start = KtxHeader::LENGTH + sizes.len() * LevelIndex::LENGTH;
+        kvd.extend_from_slice(&content.keys);
+        let count = content.levels.len();
+        let dfd_start = KtxHeader::LENGTH + count * LevelIndex::LENGTH;
         let kvd_start = dfd_start + dfd.len();
         // Levels lie smallest first, each aligned to its texel where it is not compressed.
-        let alignment = if scheme.is_none() { layout.precision.texel_bytes() as u64 } else { 1 };
+        let alignment = if scheme.is_none() { content.alignment } else { 1 };
         let mut end = (kvd_start + kvd.len()) as u64;
-        let mut levels = vec![0; sizes.len()];
+        let mut levels = vec![0; count];
         for (start, length) in levels.iter_mut().zip(stored).rev() {
             *start = end.next_multiple_of(alignment);
             end = *start + length;
         }
         let ktx = KtxHeader {
-            format: Some(format),
-            type_size,
-            pixel_width: layout.size.width as u32,
-            pixel_height: layout.size.height as u32,
+            format: content.format,
+            type_size: content.type_size,
+            pixel_width: content.size.width as u32,
+            pixel_height: content.size.height as u32,
             pixel_depth: 0,
-            layer_count: layout.layers as u32,
+            layer_count: content.layers as u32,
             face_count: 1,
-            level_count: sizes.len() as u32,
+            level_count: count as u32,
             supercompression_scheme: scheme,
             index: Index {
                 dfd_byte_offset: dfd_start as u32,
@@ -115,24 +146,23 @@ impl Front {
             },
         };
         let mut bytes = ktx.as_bytes().to_vec();
-        for ((byte_offset, byte_length), size) in levels.iter().zip(stored).zip(&sizes) {
+        for ((byte_offset, byte_length), whole) in levels.iter().zip(stored).zip(&content.levels) {
             let index = LevelIndex {
                 byte_offset: *byte_offset,
                 byte_length: *byte_length,
-                uncompressed_byte_length: level_bytes(&layout, *size),
+                uncompressed_byte_length: *whole,
             };
             bytes.extend_from_slice(&index.as_bytes());
         }
         bytes.extend(dfd);
         bytes.extend(kvd);
-        Ok(Self { bytes, levels, length: end })
+        Self { bytes, levels, length: end }
     }
 
     /// Front of a file that is not compressed.
     fn plain(path: &Path, header: &Header, layout: Layout) -> Result<Self, MapError> {
-        let stored: Vec<u64> =
-            level_sizes(layout.size).iter().map(|size| level_bytes(&layout, *size)).collect();
-        Self::new(path, header, layout, None, &stored)
+        let content = Content::of_map(path, header, layout)?;
+        Ok(Self::new(&content, None, &content.levels))
     }
 }
 
@@ -159,7 +189,10 @@ fn open_sink(
     check_channels(path, options)?;
     Ok(match options.zstd {
         None => Box::new(PlainSink::create(path, header, layout)?),
-        Some(zstd) => Box::new(ZstdSink::create(CompressedFile::create(path, header, layout, zstd)?)?),
+        Some(zstd) => {
+            let content = Content::of_map(path, header, layout)?;
+            Box::new(ZstdSink::create(CompressedFile::create(path, content, zstd)?, layout)?)
+        }
     })
 }
 
@@ -168,7 +201,7 @@ fn write_ndf(path: &Path, map: &NdfMap, options: &WriteOptions) -> Result<u64, M
     check_channels(path, options)?;
     let (p, layout) = (&map.pyramid, map.pyramid.layout());
     if let Some(zstd) = options.zstd {
-        let file = CompressedFile::create(path, &map.header, layout, zstd)?;
+        let file = CompressedFile::create(path, Content::of_map(path, &map.header, layout)?, zstd)?;
         return file.write(|level| Ok(p.level_bytes(level)));
     }
     let mut sink = PlainSink::create(path, &map.header, layout)?;
@@ -263,9 +296,9 @@ struct ZstdSink {
 }
 
 impl ZstdSink {
-    fn create(file: CompressedFile) -> Result<Self, MapError> {
-        let front = Front::plain(file.file.target(), &file.header, file.layout)?;
-        Ok(Self { plain: file.file.scratch()?, rows: Rows::new(file.layout, front), file })
+    fn create(file: CompressedFile, layout: Layout) -> Result<Self, MapError> {
+        let front = Front::new(&file.content, None, &file.content.levels);
+        Ok(Self { plain: file.file.scratch()?, rows: Rows::new(layout, front), file })
     }
 }
 
@@ -289,15 +322,14 @@ impl LevelSink for ZstdSink {
 #[derive(Debug)]
 struct CompressedFile {
     file: AtomicFile,
-    header: Header,
-    layout: Layout,
+    content: Content,
     /// Level of compression, from 1 (fast) to 22.
     zstd: i32,
 }
 
 impl CompressedFile {
-    fn create(path: &Path, header: &Header, layout: Layout, zstd: i32) -> Result<Self, MapError> {
-        Ok(Self { file: AtomicFile::create(path)?, header: header.clone(), layout, zstd })
+    fn create(path: &Path, content: Content, zstd: i32) -> Result<Self, MapError> {
+        Ok(Self { file: AtomicFile::create(path)?, content, zstd })
     }
 
     /// Compresses what `read` gives for each level, and names the file; returns its length in bytes.
@@ -305,18 +337,17 @@ impl CompressedFile {
         let path = self.file.target().to_owned();
         let io = |e| MapError::io(&path, e);
         let scheme = Some(SupercompressionScheme::Zstandard);
-        let front = |stored: &[u64]| Front::new(&path, &self.header, self.layout, scheme, stored);
-        let sizes = level_sizes(self.layout.size);
-        let mut stored = vec![0; sizes.len()];
+        let front = |stored: &[u64]| Front::new(&self.content, scheme, stored);
+        let mut stored = vec![0; self.content.levels.len()];
         // A front is as long whatever it says; what the levels take is known after them.
-        let start = front(&stored)?.bytes.len() as u64;
+        let start = front(&stored).bytes.len() as u64;
         let mut file: &File = self.file.file();
         file.seek(SeekFrom::Start(start)).map_err(io)?;
-        for (level, size) in sizes.iter().enumerate().rev() {
+        for (level, length) in self.content.levels.iter().enumerate().rev() {
             let bytes = read(level).map_err(io)?;
-            stored[level] = deflate(bytes, level_bytes(&self.layout, *size), self.zstd, file).map_err(io)?;
+            stored[level] = deflate(bytes, *length, self.zstd, file).map_err(io)?;
         }
-        let front = front(&stored)?;
+        let front = front(&stored);
         write_at(file, 0, &front.bytes).map_err(io)?;
         self.file.finish()?;
         Ok(front.length)
