@@ -38,6 +38,7 @@ pub mod ndf;
 pub mod observe;
 pub mod procedural;
 pub mod pyramid;
+pub mod roughness;
 pub mod shader;
 pub mod sphere;
 pub mod surface;

@@ -100,6 +100,11 @@ impl From<LobeAngle> for SlopeVariance {
     }
 }
 
+impl PerceptualRoughness {
+    /// Least of the slider: nearly a mirror.
+    pub const SMOOTHEST: Self = Self(1e-2);
+}
+
 impl SlopeVariance {
     /// No spread at all.
     pub const ZERO: Self = Self(0.0);
