@@ -5,6 +5,7 @@ use ndfmap::choose::Choice;
 use ndfmap::compare::{Comparison, three_digits};
 use ndfmap::core::measure::{Estimate, FilteringError, SURE, UNSEEN};
 use ndfmap::render::{DriftReport, RenderReport};
+use ndfmap::roughness::{Errors, RoughnessMips};
 use ndfmap_figures::{Claim, Made, Paper, TABLE, Verdict, digits};
 
 /// List of the figures of the papers.
@@ -36,6 +37,36 @@ pub(crate) fn made(all: &[Made]) -> String {
     }
     let Verdict { judged, met } = Verdict::of(&claims().cloned().collect::<Vec<_>>());
     text + &format!("{} figures; of {judged} statements that can be judged, {met} come out\n", all.len())
+}
+
+/// Tables of roughness mips: a row a level, stock beside what was made; and a row for all that was tried.
+pub(crate) fn roughness(mips: &RoughnessMips) -> String {
+    let report = &mips.report;
+    let mut text =
+        "errors as an engine shades each level, against the mean of all normals under a texel\n\n".to_owned();
+    text +=
+        "level   size  roughness      mean: stock   made  relative L2: stock   made  FLIP: stock   made\n";
+    for level in &report.levels {
+        let size = mips.levels[level.level].size();
+        text += &format!(
+            "{:5} {:>6}  {:13} {:>12.3} {:>6.3} {:>19} {:>6} {:>12.3} {:>6.3}\n",
+            level.level,
+            size.width.max(size.height),
+            level.by.to_string(),
+            level.stock_roughness,
+            level.made_roughness,
+            three_digits(level.stock.relative_l2),
+            three_digits(level.made.relative_l2),
+            level.stock.flip,
+            level.made.flip,
+        );
+    }
+    let row = |name: &str, of: Errors| format!("{name:13} {:>11.2} {:>5.2}\n", of.relative_l2, of.flip);
+    text += "\nover stock    relative L2  FLIP   (means over levels)\n";
+    for tried in &report.tried {
+        text += &row(&tried.by.to_string(), tried.of_stock);
+    }
+    text + &row("as written", report.of_stock)
 }
 
 /// Table of a comparison: a row a method, a column a level.

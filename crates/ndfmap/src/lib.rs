@@ -38,6 +38,7 @@ mod error;
 pub mod inspect;
 pub mod render;
 pub mod report;
+pub mod roughness;
 mod scene_spec;
 
 pub use bake::{BakeJob, BakeReport, BakeSeconds};

@@ -11,6 +11,7 @@ mod demo;
 mod figure;
 mod inspect;
 mod render;
+mod roughness;
 #[cfg(feature = "gpu")]
 mod shader;
 mod shell;
@@ -66,6 +67,7 @@ enum Command {
     Compare(compare::Compare),
     Render(Box<render::Render>),
     Figure(figure::FigureCommand),
+    Roughness(Box<roughness::Roughness>),
     #[cfg(feature = "gpu")]
     Shader(shader::Shader),
     Completions(shell::Completions),
@@ -93,6 +95,7 @@ impl Program {
             Command::Compare(command) => command.run(json),
             Command::Render(command) => command.run(json),
             Command::Figure(command) => command.run(json),
+            Command::Roughness(command) => command.run(json),
             #[cfg(feature = "gpu")]
             Command::Shader(command) => command.run(json),
             Command::Completions(command) => command.run(),

@@ -129,6 +129,38 @@ impl Plot {
         Ok(svg)
     }
 
+    /// Corner for the legend: the one with the fewest points of lines in it.
+    fn emptiest_corner(&self) -> SeriesLabelPosition {
+        // Where a point lies along an axis, from 0 to 1.
+        let along = |axis: &Axis, value: f64| {
+            let span = axis.span();
+            (axis.place(value) - span.start) / (span.end - span.start)
+        };
+        let points: Vec<[f64; 2]> = self
+            .lines
+            .iter()
+            .flat_map(|line| &line.points)
+            .map(|[x, y]| [along(&self.x, *x), along(&self.y, *y)])
+            .collect();
+        let within = |right: bool, upper: bool| {
+            let near = |at: f64, far: bool| if far { at > 0.7 } else { at < 0.3 };
+            points.iter().filter(|[x, y]| near(*x, right) && near(*y, upper)).count()
+        };
+        let corners = [
+            (SeriesLabelPosition::LowerRight, within(true, false)),
+            (SeriesLabelPosition::UpperRight, within(true, true)),
+            (SeriesLabelPosition::LowerLeft, within(false, false)),
+            (SeriesLabelPosition::UpperLeft, within(false, true)),
+        ];
+        let [mut corner, others @ ..] = corners;
+        for other in others {
+            if other.1 < corner.1 {
+                corner = other;
+            }
+        }
+        corner.0
+    }
+
     fn on<D: DrawingBackend>(
         &self,
         area: &DrawingArea<D, Shift>,
@@ -185,7 +217,7 @@ impl Plot {
         }
         chart
             .configure_series_labels()
-            .position(SeriesLabelPosition::LowerRight)
+            .position(self.emptiest_corner())
             .label_font(words(14))
             .legend_area_size(pixels(30))
             .margin(pixels(8))
