@@ -132,9 +132,9 @@ fn all_height_maps_load() {
 #[test]
 fn errors_on_real_maps_agree_with_the_independent_program() {
     let Some(data) = data() else { return };
-    // A numpy program's errors at blocks of 64 (level 6): naive, toksvig, slopes, sh:7; and a bound on how far
-    // ours may lie. It drew 64 random blocks where we take every texel: measured 3.9, 1.7, 6.2, 3.9, 3.6, 0.6,
-    // 1.4 and 0.4 %.
+    // A numpy program's errors at blocks of 64 (level 6): naive, toksvig, slopes, sh:7; and a bound on how
+    // far ours may lie. It drew 64 random blocks where we take every texel: measured 3.9, 1.7, 6.2, 3.9, 3.6,
+    // 0.6, 1.4 and 0.4 %.
     let table = [
         ("ambientcg_Bricks075B_1K_NormalGL.jpg", 50, [1.12, 0.255, 0.466, 0.193], 0.045),
         ("ambientcg_Bricks075B_1K_NormalGL.jpg", 400, [3.78, 0.397, 0.571, 0.389], 0.02),
