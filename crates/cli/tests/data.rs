@@ -164,9 +164,9 @@ fn errors_on_real_maps_agree_with_the_independent_program() {
 #[test]
 fn fitted_lobes_are_at_least_as_good_as_the_independent_program() {
     let Some(data) = data() else { return };
-    // The same program's plain EM from furthest points, at blocks of 64: vmf:1, 2, 4, 6 and gmm:4;
-    // and a bound on ours over its own. Refined lobes of four and six are worse on one map's wide lobes, by up
-    // to 11.6 %; elsewhere ours are the better.
+    // The same program's plain EM from furthest points, at blocks of 64: vmf:1, 2, 4, 6 and gmm:4; and a
+    // bound on ours over its own. Refined lobes of four and six are worse on one map's wide lobes, by up to
+    // 11.6 %; elsewhere ours are the better.
     let table = [
         ("ambientcg_Bricks075B_1K_NormalGL.jpg", 50, [0.229, 0.144, 0.062, 0.045, 0.085], 1.0),
         ("ambientcg_Bricks075B_1K_NormalGL.jpg", 400, [0.368, 0.234, 0.13, 0.105, 0.141], 1.0),
