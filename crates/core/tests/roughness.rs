@@ -91,8 +91,8 @@ fn three_js_widens_level_by_level() {
     let normals: Vec<f32> = (0..64).flat_map(checker).collect();
     let surface = surface(&normals, &[0.5; 64]);
     let levels = surface.bake(Widening::Rule(find("three").unwrap()), &Unobserved).unwrap();
-    // Its knots: 0.5 lies between (0.4, 0.046) and (0.8, 0.276), and so variance 0.1035; 0.2 more lies between
-    // (0.8, 0.276) and (1, 0.339): 0.8 + 0.2 (0.3035 - 0.276)/0.063.
+    // Its knots: 0.5 lies between (0.4, 0.046) and (0.8, 0.276), and so variance 0.1035; 0.2 more lies
+    // between (0.8, 0.276) and (1, 0.339): 0.8 + 0.2 (0.3035 - 0.276)/0.063.
     let expected = 0.8 + 0.2 * (0.3035 - 0.276) / 0.063;
     for level in &levels[1..] {
         let got = f64::from(level.row(0)[0]);

@@ -84,8 +84,8 @@ fn blurred_cubes_are_those_of_an_independent_program() {
     let expected = reference();
     let at: Vec<DVec3> = ["lights", "eyes"].iter().flat_map(|key| directions(&expected[key])).collect();
     let light = sky();
-    // A level has 64 to 4 texels on a side of the cube, and is linear between them. Measured, Beckmann and GGX:
-    // 3e-4, 2e-3, 6e-3, 9e-3, 0.029 and 1.8e-3, 4e-3, 7e-3, 0.012, 0.032.
+    // A level has 64 to 4 texels on a side of the cube, and is linear between them. Measured, Beckmann and
+    // GGX: 3e-4, 2e-3, 6e-3, 9e-3, 0.029 and 1.8e-3, 4e-3, 7e-3, 0.012, 0.032.
     let bounds = [[5e-4, 3e-3, 8e-3, 0.012, 0.035], [2.5e-3, 5e-3, 9e-3, 0.015, 0.038]];
     for blur in expected["blurs"].as_array().unwrap() {
         let ggx = blur["facets"] == "ggx";

@@ -1,8 +1,8 @@
 //! A material as real-time engines shade it: glTF's, under a directional light.
 //!
-//! GGX with Smith's height-correlated visibility and Schlick's Fresnel term, and a Lambert part for what is no
-//! metal (Khronos, glTF 2.0, appendix B; three.js's `BRDF_GGX`). Cosines are clamped at zero, where our own
-//! models cut off, so a normal that turns from the eye still shines, as it does there.
+//! GGX with Smith's height-correlated visibility and Schlick's Fresnel term, and a Lambert part for what is
+//! no metal (Khronos, glTF 2.0, appendix B; three.js's `BRDF_GGX`). Cosines are clamped at zero, where our
+//! own models cut off, so a normal that turns from the eye still shines, as it does there.
 
 use std::f64::consts::PI;
 

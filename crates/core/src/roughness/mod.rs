@@ -1,10 +1,10 @@
 //! Roughness mips: for each texel of each level the roughness of one GGX lobe, which an engine's own material
 //! shades in place of all the normals under it.
 //!
-//! An engine averages a normal map and a roughness map apart, level by level. What the normals lose in spread,
-//! the roughness has to gain, or a surface dulls or sparkles with distance. This is the one-lobe form of a
-//! normal distribution map, for renderers that take no other: `fit.rs` chooses the lobe by what a viewer sees,
-//! `rules.rs` has the closed formulas that engines ship.
+//! An engine averages a normal map and a roughness map apart, level by level. What the normals lose in
+//! spread, the roughness has to gain, or a surface dulls or sparkles with distance. This is the one-lobe form
+//! of a normal distribution map, for renderers that take no other: `fit.rs` chooses the lobe by what a viewer
+//! sees, `rules.rs` has the closed formulas that engines ship.
 
 mod engine;
 mod fit;
@@ -47,8 +47,8 @@ pub enum Widening {
 }
 
 impl RoughSurface {
-    /// A surface whose perceptual roughness (glTF's; its square is the width alpha of GGX) is a map. Where the
-    /// two differ in size, the smaller is enlarged, bilinearly, and by the surface's own wraps.
+    /// A surface whose perceptual roughness (glTF's; its square is the width alpha of GGX) is a map. Where
+    /// the two differ in size, the smaller is enlarged, bilinearly, and by the surface's own wraps.
     ///
     /// # Errors
     /// [`RoughnessError`] for a roughness that is no number from 0 to 1.
@@ -96,8 +96,8 @@ impl RoughSurface {
         across.div_ceil(side.max(8))
     }
 
-    /// Normal and roughness of every `stride`th texel under a texel of a level, and its weight; weights sum to
-    /// one.
+    /// Normal and roughness of every `stride`th texel under a texel of a level, and its weight; weights sum
+    /// to one.
     pub fn under(
         &self,
         level: Size,

@@ -1,6 +1,6 @@
 //! Rules: closed formulas by which engines and their tools widen roughness. All measure how short the mean
-//! normal is, and most take `kappa = (3L - L³)/(1 - L²)` from its length L (Banerjee et al. 2005). They differ
-//! in the constant, and in what it is added to.
+//! normal is, and most take `kappa = (3L - L³)/(1 - L²)` from its length L (Banerjee et al. 2005). They
+//! differ in the constant, and in what it is added to.
 
 use super::Mean;
 use crate::grid::Grid;

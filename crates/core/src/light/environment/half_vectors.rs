@@ -5,9 +5,10 @@
 //! The views are precomputed on a grid of 16 × 16 directions, in the environment's own frame, and shading is
 //! interpolated between four: so both the eye and the light may turn from frame to frame.
 //!
-//! Cut off at order 8, a small lamp rings: a second band of highlights lies beside its own. So each environment
-//! has a least width of lobes, at which its ringing is low; narrower lobes are drawn as wide as that. A sky
-//! leaves lobes as they are; a dark room with lamps needs some 11 degrees. The paper does not do this.
+//! Cut off at order 8, a small lamp rings: a second band of highlights lies beside its own. So each
+//! environment has a least width of lobes, at which its ringing is low; narrower lobes are drawn as wide as
+//! that. A sky leaves lobes as they are; a dark room with lamps needs some 11 degrees. The paper does not do
+//! this.
 
 use std::f64::consts::{PI, TAU};
 

@@ -34,9 +34,9 @@ pub struct Texture {
 /// Bytes of a block of UASTC, and its side.
 const BLOCK: u64 = 16;
 
-/// Descriptor of UASTC with three channels (Khronos Data Format Specification 1.3, section 5.6.16): version 2,
-/// 40 bytes, colour model 166, primaries of BT.709, linear, blocks of 4 × 4 texels and 16 bytes, one sample of
-/// 128 bits, from 0 to all bits.
+/// Descriptor of UASTC with three channels (Khronos Data Format Specification 1.3, section 5.6.16): version
+/// 2, 40 bytes, colour model 166, primaries of BT.709, linear, blocks of 4 × 4 texels and 16 bytes, one
+/// sample of 128 bits, from 0 to all bits.
 const UASTC_DESCRIPTOR: [u8; 40] = [
     0, 0, 0, 0, 2, 0, 40, 0, 166, 1, 1, 0, 3, 3, 0, 0, 16, 0, 0, 0, 0, 0, 0, 0, 0, 0, 127, 0, 0, 0, 0, 0, 0,
     0, 0, 0, 255, 255, 255, 255,
@@ -55,8 +55,8 @@ impl Texture {
         }
     }
 
-    /// Writes a KTX2 file, its levels plain, or compressed by Zstandard at a level from 1 (fast) to 22; returns
-    /// its length in bytes.
+    /// Writes a KTX2 file, its levels plain, or compressed by Zstandard at a level from 1 (fast) to 22;
+    /// returns its length in bytes.
     ///
     /// # Errors
     /// [`MapError`] when the file cannot be written.
@@ -189,8 +189,8 @@ mod tests {
 
     #[test]
     fn an_independent_transcoder_reads_every_level() {
-        // Means and largest errors of a byte, measured: 0.23 and 3, 1.44 and 12 as they are; 0.51 and 9, 1.57 and
-        // 14 as BC7.
+        // Means and largest errors of a byte, measured: 0.23 and 3, 1.44 and 12 as they are; 0.51 and 9, 1.57
+        // and 14 as BC7.
         for (noise, target, mean, most) in [
             (0, TargetFormat::Rgba32, 0.3, 4),
             (40, TargetFormat::Rgba32, 1.6, 14),
