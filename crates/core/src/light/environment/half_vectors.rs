@@ -210,17 +210,17 @@ mod tests {
         let sky = HalfVectors::of(&smooth(Size { width: 128, height: 64 }));
         let mirror = [1.0; HALF_VECTOR_ORDER + 1];
         assert!(sky.narrowest() == SlopeVariance::ZERO && sky.widened(mirror) == mirror);
-        // A lamp of one texel in the dark rings by a fifth and more.
+        // A lamp of one texel in the dark: measured 0.036, 11 degrees.
         let mut lamp = crate::grid::Grid::from_fn(Size { width: 128, height: 64 }, |_, _| glam::Vec3::ZERO);
         lamp.row_mut(20)[30] = glam::Vec3::ONE;
         let lamp = HalfVectors::of(&Environment::new(lamp).unwrap());
-        assert!(lamp.narrowest().get() > 0.02, "{:?}", lamp.narrowest());
+        assert!((lamp.narrowest().get() - 0.036).abs() < 2e-3, "{:?}", lamp.narrowest());
         let last = lamp.widened(mirror)[HALF_VECTOR_ORDER];
         assert!((last - (-rate(HALF_VECTOR_ORDER) * lamp.narrowest().get()).exp()).abs() < 1e-12);
         // A lobe that is wide by itself stays as it is.
         let wide = std::array::from_fn(|l| (-rate(l) * 2.0 * lamp.narrowest().get()).exp());
         assert!(lamp.widened(wide) == wide);
-        // What is below zero beside the lamp's highlight, against the highlight.
+        // Least of the series beside the lamp's highlight, over the highlight.
         let values = |zonal: &[f64; HALF_VECTOR_ORDER + 1]| {
             let series = |i: usize| {
                 let mu = view_direction(i % VIEWS, i / VIEWS);
@@ -234,7 +234,8 @@ mod tests {
             let of = |pick: fn(f64, f64) -> f64| all.iter().copied().fold(0.0, pick);
             -of(f64::min) / of(f64::max)
         };
-        assert!(values(&mirror) > 0.1 && values(&lamp.widened(mirror)) < 0.08);
+        // Measured 0.164 and 0.053: this view's, where RINGING bounds the mean over views.
+        assert!(values(&mirror) > 0.15 && values(&lamp.widened(mirror)) < 0.06);
     }
 
     #[test]

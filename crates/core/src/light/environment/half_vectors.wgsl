@@ -37,7 +37,8 @@ fn half_vector_between(around: ViewsAround, i: u32) -> vec3<f32> {
 fn over_half_vectors(wo: vec3<f32>, mu: vec3<f32>, spread: f32, printed: bool) -> vec3<f32> {
     let around = views_around(wo);
     let rate_of_last = 0.5 * f32(HALF_VECTOR_ORDER * (HALF_VECTOR_ORDER + 1u));
-    let left = split_sum_texel(HALF_VECTOR_ORDER, SPLIT_SUM_ENTRIES).x / split_sum_texel(0u, SPLIT_SUM_ENTRIES).x;
+    let whole = split_sum_texel(0u, SPLIT_SUM_ENTRIES).x;
+    let left = split_sum_texel(HALF_VECTOR_ORDER, SPLIT_SUM_ENTRIES).x / whole;
     let own = spread - log(max(left, 1e-30)) / rate_of_last;
     let widened = select(spread + max(environment.irradiance[3].w - own, 0.0), spread, printed);
     var sum = vec3<f32>(0.0);
