@@ -6,13 +6,13 @@
 //! D_k^p)²` over rings k of half-vectors about the mean, M the azimuth average of the texel's own lobes. A
 //! power of one serves relative L2, where few bright pixels rule; a small one serves FLIP.
 
-use rayon::prelude::*;
+use std::sync::LazyLock;
 
+use super::mips::filled;
 use super::profile::{Profile, Profiles, RINGS, WIDTHS, alpha_at};
 use super::{Mean, RoughSurface};
 use crate::grid::{Grid, Size};
 use crate::observe::{Cancelled, Observer};
-use crate::pyramid::level_sizes;
 use crate::surface::unit_or_up;
 
 /// Samples that a level's fits read, all together.
@@ -34,34 +34,29 @@ impl Default for Objective {
     }
 }
 
+/// Table of profiles, worked out once.
+static PROFILES: LazyLock<Profiles> = LazyLock::new(Profiles::new);
+
 pub(super) fn fit(
     surface: &RoughSurface,
-    means: &[Grid<Mean>],
     objective: Objective,
     observer: &dyn Observer,
 ) -> Result<Vec<Grid<f32>>, Cancelled> {
-    let profiles = Profiles::new();
+    let profiles = &*PROFILES;
     let seen = |profile: &Profile| -> Profile { profile.map(|d| d.powf(objective.power)) };
     let lobes: Vec<Profile> = (0..WIDTHS).map(|i| seen(profiles.central(i))).collect();
-    let sizes = level_sizes(surface.size());
-    let finest = means[0].texels().iter().map(|mean| mean.roughness).collect();
-    let mut levels =
-        vec![Grid::from_vec(sizes[0], finest).unwrap_or_else(|| unreachable!("as many as the size says"))];
-    for (level, size) in sizes.iter().enumerate().skip(1) {
+    let mut levels = vec![filled(surface.size(), |x, y| surface.mean(0, x, y).roughness)];
+    let sizes = surface.sizes();
+    let last = (sizes.len() - 1) as f64;
+    for (level, size) in sizes.enumerate().skip(1) {
         observer.check()?;
-        let texel = |x: usize, y: usize| {
-            let mean = &means[level].row(y)[x];
-            let mixture = mixture(surface, &profiles, (*size, (x, y)), mean);
-            let Some(mixture) = mixture else { return mean.roughness };
+        levels.push(filled(size, |x, y| {
+            let mean = surface.mean(level, x, y);
+            let Some(mixture) = mixture(surface, profiles, size, (x, y), mean) else { return mean.roughness };
             nearest(&seen(&mixture), &lobes, &profiles.weights)
-        };
-        let rows: Vec<Vec<f32>> = (0..size.height)
-            .into_par_iter()
-            .map(|y| (0..size.width).map(|x| texel(x, y)).collect())
-            .collect();
-        levels.push(Grid::from_vec(*size, rows.concat()).unwrap_or_else(|| unreachable!("row by row")));
+        }));
         // A level costs about as much as the one before it, until footprints are as large as samples allow.
-        observer.progress(level as f64 / (sizes.len() - 1) as f64);
+        observer.progress(level as f64 / last);
     }
     Ok(levels)
 }
@@ -71,16 +66,17 @@ pub(super) fn fit(
 fn mixture(
     surface: &RoughSurface,
     profiles: &Profiles,
-    (level, at): (Size, (usize, usize)),
-    mean: &Mean,
+    level: Size,
+    at: (usize, usize),
+    mean: Mean,
 ) -> Option<Profile> {
     let about = unit_or_up(mean.normal);
     let mut mixture = [0.0; RINGS];
     let mut varies = false;
-    surface.under(level, at, surface.stride(level, SAMPLES), |weight, normal, roughness| {
-        let cosine = normal.dot(about);
-        varies |= cosine < 1.0 - 1e-6 || (roughness - mean.roughness).abs() > 1e-4;
-        let lobe = profiles.lobe(roughness, cosine);
+    surface.under(level, at, surface.stride(level, SAMPLES), |weight, texel| {
+        let cosine = texel.normal.dot(about);
+        varies |= cosine < 1.0 - 1e-6 || (texel.roughness - mean.roughness).abs() > 1e-4;
+        let lobe = profiles.lobe(texel.roughness, cosine);
         for (sum, d) in mixture.iter_mut().zip(lobe) {
             *sum += weight * d;
         }

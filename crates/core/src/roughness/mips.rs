@@ -1,50 +1,48 @@
-//! Mips of plain values: means, as an engine makes them, and enlargement.
-
-use std::ops::{Add, Mul};
+//! Plain mips of values, as an engine makes them, and their enlargement.
 
 use rayon::prelude::*;
 
 use crate::grid::{Grid, Size};
-use crate::pyramid::footprint;
+use crate::lookup::area_mean;
+use crate::pyramid::level_sizes;
+use crate::surface::Wraps;
 
-/// Mean of the texels under one texel of the next level.
+/// Every level of a map of values, finest first: exact area means.
 #[must_use]
-pub fn mean_under<T>(above: &Grid<T>, size: Size, (x, y): (usize, usize)) -> T
-where
-    T: Copy + Default + Add<Output = T> + Mul<f32, Output = T>,
-{
-    let (columns, column_weight) = footprint(above.size().width, size.width, x);
-    let (rows, row_weight) = footprint(above.size().height, size.height, y);
-    let mut mean = T::default();
-    for j in rows {
-        for i in columns.clone() {
-            mean = mean + above.row(j)[i] * (column_weight(i) * row_weight(j)) as f32;
-        }
+pub fn mips(finest: Grid<[f32; 4]>) -> Vec<Grid<[f32; 4]>> {
+    let mut levels = vec![finest];
+    for size in level_sizes(levels[0].size()).into_iter().skip(1) {
+        // Texels that fill those of the next level hold all that it needs.
+        let above = &levels[levels.len() - 1];
+        let nests =
+            above.size().width.is_multiple_of(size.width) && above.size().height.is_multiple_of(size.height);
+        let from = if nests { above } else { &levels[0] };
+        let level = filled(size, |x, y| area_mean(from, size, x, y));
+        levels.push(level);
     }
-    mean
+    levels
 }
 
-/// Texels of a larger size, bilinearly between those of a smaller one, which `at` gives beyond its edges too.
+/// Values at a larger size, bilinearly between texels.
 #[must_use]
-pub fn enlarged<T>(from: Size, to: Size, at: impl Fn(isize, isize) -> T + Sync) -> Grid<T>
-where
-    T: Add<Output = T> + Mul<f32, Output = T> + Send,
-{
+pub fn enlarged(values: &Grid<[f32; 4]>, size: Size, wraps: Wraps) -> Grid<[f32; 4]> {
+    let from = values.size();
     let place = |i: usize, fine: usize, coarse: usize| {
         let x = (i as f64 + 0.5) * coarse as f64 / fine as f64 - 0.5;
         (x.floor() as isize, (x - x.floor()) as f32)
     };
-    let row = |y: usize| {
-        let (j, v) = place(y, to.height, from.height);
-        let at = &at;
-        (0..to.width).map(move |x| {
-            let (i, u) = place(x, to.width, from.width);
-            let above = at(i, j) * (1.0 - u) + at(i + 1, j) * u;
-            let below = at(i, j + 1) * (1.0 - u) + at(i + 1, j + 1) * u;
-            above * (1.0 - v) + below * v
-        })
-    };
-    let rows: Vec<Vec<T>> = (0..to.height).into_par_iter().map(|y| row(y).collect()).collect();
+    filled(size, |x, y| {
+        let ((i, u), (j, v)) = (place(x, size.width, from.width), place(y, size.height, from.height));
+        let at = |i, j| values.row(wraps.y.index(j, from.height))[wraps.x.index(i, from.width)];
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)];
+        std::array::from_fn(|k| (a[k] * (1.0 - u) + b[k] * u) * (1.0 - v) + (c[k] * (1.0 - u) + d[k] * u) * v)
+    })
+}
+
+/// Grid whose rows are worked out in parallel, each by itself.
+pub(super) fn filled<T: Send>(size: Size, texel: impl Fn(usize, usize) -> T + Sync) -> Grid<T> {
+    let row = |y: usize| (0..size.width).map(|x| texel(x, y)).collect::<Vec<T>>();
+    let rows: Vec<Vec<T>> = (0..size.height).into_par_iter().map(row).collect();
     let texels = rows.into_iter().flatten().collect();
-    Grid::from_vec(to, texels).unwrap_or_else(|| unreachable!("row by row"))
+    Grid::from_vec(size, texels).unwrap_or_else(|| unreachable!("row by row"))
 }

@@ -16,20 +16,36 @@ use glam::Vec3;
 
 use crate::grid::{Grid, Size};
 use crate::observe::{Cancelled, Observer};
-use crate::pyramid::{footprint, level_sizes};
+use crate::pyramid::footprint;
 use crate::surface::{Surface, SurfaceRow, unit_or_up};
 
 pub use engine::{EngineMaterial, LEAST_ROUGHNESS};
 pub use fit::Objective;
-pub use mips::{enlarged, mean_under};
-pub use rules::{Reads, Row, Spread, TABLE, find};
+pub use mips::{enlarged, mips};
+pub use rules::{PLAIN, Reads, Row, Spread, TABLE, find};
 
-/// Normals and roughness of the finest level, as large as one another.
+use mips::filled;
+
+/// Normals and roughness, as large as one another, and their plain mips.
 #[derive(Clone, Debug)]
 pub struct RoughSurface {
-    size: Size,
-    normals: Vec<Vec3>,
-    roughness: Vec<f32>,
+    /// Normal and roughness of every texel of every level.
+    levels: Vec<Grid<[f32; 4]>>,
+}
+
+/// Mean of the normals and of the roughness under a texel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mean {
+    /// Mean normal; as short as the normals are spread.
+    pub normal: Vec3,
+    /// Mean perceptual roughness.
+    pub roughness: f32,
+}
+
+impl Mean {
+    fn of([x, y, z, roughness]: [f32; 4]) -> Self {
+        Self { normal: Vec3::new(x, y, z), roughness }
+    }
 }
 
 /// Error of a roughness that is no number from 0 to 1.
@@ -40,7 +56,7 @@ pub struct RoughnessError(pub f32);
 /// Method by which roughness is worked out.
 #[derive(Clone, Copy, Debug)]
 pub enum Widening {
-    /// One lobe fitted to each texel.
+    /// Fit of one lobe to each texel.
     Fit(Objective),
     /// A closed formula that an engine ships.
     Rule(&'static Row),
@@ -56,57 +72,59 @@ impl RoughSurface {
         if let Some(bad) = roughness.texels().iter().find(|r| !(0.0..=1.0).contains(*r)) {
             return Err(RoughnessError(*bad));
         }
-        let own = surface.size();
-        let mut rows = Vec::with_capacity(own.area());
+        let (own, other, wraps) = (surface.size(), roughness.size(), surface.wraps());
+        let mut texels = Vec::with_capacity(own.area());
         let mut row = SurfaceRow::flat(own.width);
         for y in 0..own.height {
             surface.read_row(y, &mut row);
-            rows.extend((0..own.width).map(|i| row.normal(i)));
+            texels.extend((0..own.width).map(|i| row.normal(i).extend(0.0).to_array()));
         }
-        let other = roughness.size();
+        let normals = Grid::from_vec(own, texels).unwrap_or_else(|| unreachable!("row by row"));
         let size = Size { width: own.width.max(other.width), height: own.height.max(other.height) };
-        let wraps = surface.wraps();
-        let normals = if own == size {
-            rows
-        } else {
-            let at = |x, y| rows[wraps.y.index(y, own.height) * own.width + wraps.x.index(x, own.width)];
-            enlarged(own, size, at).texels().iter().map(|n| unit_or_up(*n)).collect()
-        };
-        let roughness = if other == size {
-            roughness.texels().to_vec()
-        } else {
-            let at = |x, y| roughness.row(wraps.y.index(y, other.height))[wraps.x.index(x, other.width)];
-            enlarged(other, size, at).texels().to_vec()
-        };
-        Ok(Self { size, normals, roughness })
+        let normals = if own == size { normals } else { enlarged(&normals, size, wraps) };
+        let plain = Grid::from_fn(other, |x, y| [roughness.row(y)[x]; 4]);
+        let roughness = if other == size { plain } else { enlarged(&plain, size, wraps) };
+        let both = filled(size, |x, y| {
+            // What was between two normals is a normal again.
+            let Mean { normal, .. } = Mean::of(normals.row(y)[x]);
+            let normal = if own == size { normal } else { unit_or_up(normal) };
+            normal.extend(roughness.row(y)[x][0]).to_array()
+        });
+        Ok(Self { levels: mips(both) })
     }
 
     /// Width and height in texels.
     #[must_use]
     pub fn size(&self) -> Size {
-        self.size
+        self.levels[0].size()
+    }
+
+    /// Sizes of all levels, finest first.
+    pub fn sizes(&self) -> impl ExactSizeIterator<Item = Size> + '_ {
+        self.levels.iter().map(Grid::size)
+    }
+
+    /// Mean under a texel, as an engine's own mips have it.
+    #[must_use]
+    pub fn mean(&self, level: usize, x: usize, y: usize) -> Mean {
+        Mean::of(self.levels[level].row(y)[x])
     }
 
     /// Stride at which all texels of a level together read so many samples; where the level is large, each
     /// reads eight on a side.
     #[must_use]
     pub fn stride(&self, level: Size, samples: usize) -> usize {
-        let across = (self.size.width / level.width).max(self.size.height / level.height);
+        let finest = self.size();
+        let across = (finest.width / level.width).max(finest.height / level.height);
         let side = ((samples / level.area()) as f64).sqrt() as usize;
         across.div_ceil(side.max(8))
     }
 
     /// Normal and roughness of every `stride`th texel under a texel of a level, and its weight; weights sum
     /// to one.
-    pub fn under(
-        &self,
-        level: Size,
-        (x, y): (usize, usize),
-        stride: usize,
-        mut each: impl FnMut(f32, Vec3, f32),
-    ) {
-        let (columns, column_weight) = footprint(self.size.width, level.width, x);
-        let (rows, row_weight) = footprint(self.size.height, level.height, y);
+    pub fn under(&self, level: Size, (x, y): (usize, usize), stride: usize, mut each: impl FnMut(f32, Mean)) {
+        let (columns, column_weight) = footprint(self.size().width, level.width, x);
+        let (rows, row_weight) = footprint(self.size().height, level.height, y);
         // Strides begin in the middle of their cells, so that no side of the texel is preferred.
         let picks = |range: std::ops::Range<usize>| {
             let first = range.start + (stride - 1).min(range.len() - 1) / 2;
@@ -120,27 +138,10 @@ impl RoughSurface {
         }
         for j in picks(rows) {
             for i in picks(columns.clone()) {
-                let at = j * self.size.width + i;
                 let weight = (column_weight(i) * row_weight(j) / total) as f32;
-                each(weight, self.normals[at], self.roughness[at]);
+                each(weight, self.mean(0, i, j));
             }
         }
-    }
-
-    /// Means of every level: of normals, not normalised, and of roughness, as an engine's own mips are.
-    #[must_use]
-    pub fn means(&self) -> Vec<Grid<Mean>> {
-        let finest = self.normals.iter().zip(&self.roughness);
-        let finest = finest.map(|(n, r)| Mean { normal: *n, roughness: *r }).collect();
-        let mut levels = vec![
-            Grid::from_vec(self.size, finest).unwrap_or_else(|| unreachable!("as many as the size says")),
-        ];
-        for size in level_sizes(self.size).into_iter().skip(1) {
-            let above = &levels[levels.len() - 1];
-            let texel = |x: usize, y: usize| mean_under(above, size, (x, y));
-            levels.push(Grid::from_fn(size, texel));
-        }
-        levels
     }
 
     /// Roughness of every level, finest first; the finest is the surface's own.
@@ -148,38 +149,12 @@ impl RoughSurface {
     /// # Errors
     /// [`Cancelled`] when the observer wants it to end.
     pub fn bake(&self, widening: Widening, observer: &dyn Observer) -> Result<Vec<Grid<f32>>, Cancelled> {
-        let means = self.means();
         match widening {
-            Widening::Fit(objective) => fit::fit(self, &means, objective, observer),
+            Widening::Fit(objective) => fit::fit(self, objective, observer),
             Widening::Rule(row) => {
                 observer.check()?;
-                Ok(rules::bake(row, &means))
+                Ok(rules::bake(row, self))
             }
         }
-    }
-}
-
-/// Mean of the normals and of the roughness under a texel.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Mean {
-    /// Mean normal; as short as the normals are spread.
-    pub normal: Vec3,
-    /// Mean perceptual roughness.
-    pub roughness: f32,
-}
-
-impl std::ops::Add for Mean {
-    type Output = Self;
-
-    fn add(self, other: Self) -> Self {
-        Self { normal: self.normal + other.normal, roughness: self.roughness + other.roughness }
-    }
-}
-
-impl std::ops::Mul<f32> for Mean {
-    type Output = Self;
-
-    fn mul(self, by: f32) -> Self {
-        Self { normal: self.normal * by, roughness: self.roughness * by }
     }
 }

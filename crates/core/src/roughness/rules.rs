@@ -2,8 +2,12 @@
 //! normal is, and most take `kappa = (3L - L³)/(1 - L²)` from its length L (Banerjee et al. 2005). They
 //! differ in the constant, and in what it is added to.
 
-use super::Mean;
+use glam::Vec3;
+
+use super::RoughSurface;
+use super::mips::filled;
 use crate::grid::Grid;
+use crate::lookup::area_mean;
 use crate::surface::unit_or_up;
 
 /// Evidence that a rule goes by.
@@ -46,14 +50,17 @@ pub struct Row {
     pub rule: fn(Spread) -> f64,
 }
 
+/// Rule of plain mips, which every engine makes unless told otherwise.
+pub const PLAIN: Row = Row {
+    name: "plain",
+    summary: "the mean of the roughness, as mips are made anywhere",
+    reads: Reads::Finest,
+    rule: |s| s.roughness,
+};
+
 /// Every rule.
 pub static TABLE: &[Row] = &[
-    Row {
-        name: "plain",
-        summary: "the mean of the roughness, as mips are made anywhere",
-        reads: Reads::Finest,
-        rule: |s| s.roughness,
-    },
+    PLAIN,
     Row {
         name: "kappa",
         summary: "alpha² + 2/kappa, by theory right for a Gaussian bump (Karis 2018; Pettineo's sample)",
@@ -105,31 +112,24 @@ pub fn find(name: &str) -> Option<&'static Row> {
 }
 
 /// Roughness of every level by a rule.
-pub(super) fn bake(row: &Row, means: &[Grid<Mean>]) -> Vec<Grid<f32>> {
-    let of_level = |level: &Grid<Mean>, rule: fn(Spread) -> f64| {
-        Grid::from_fn(level.size(), |x, y| {
-            let mean = level.row(y)[x];
-            let spread =
-                Spread { length: f64::from(mean.normal.length()), roughness: f64::from(mean.roughness) };
-            rule(spread).clamp(0.0, 1.0) as f32
-        })
+pub(super) fn bake(row: &Row, surface: &RoughSurface) -> Vec<Grid<f32>> {
+    let widened = |[x, y, z, roughness]: [f32; 4]| {
+        let length = f64::from(Vec3::new(x, y, z).length());
+        (row.rule)(Spread { length, roughness: f64::from(roughness) }).clamp(0.0, 1.0) as f32
     };
-    let mut levels = vec![of_level(&means[0], |s| s.roughness)];
-    for level in 1..means.len() {
-        let widened = match row.reads {
-            Reads::Finest => of_level(&means[level], row.rule),
+    let mut levels = vec![filled(surface.size(), |x, y| surface.mean(0, x, y).roughness)];
+    for (level, size) in surface.sizes().enumerate().skip(1) {
+        levels.push(match row.reads {
+            Reads::Finest => filled(size, |x, y| widened(surface.levels[level].row(y)[x])),
             Reads::LevelAbove => {
-                let (normals, roughness) = (&means[level - 1], &levels[level - 1]);
-                let above = Grid::from_fn(normals.size(), |x, y| Mean {
-                    normal: unit_or_up(normals.row(y)[x].normal),
-                    roughness: roughness.row(y)[x],
+                let roughness = &levels[level - 1];
+                let above = filled(roughness.size(), |x, y| {
+                    let normal = unit_or_up(surface.mean(level - 1, x, y).normal);
+                    normal.extend(roughness.row(y)[x]).to_array()
                 });
-                let size = means[level].size();
-                let here = Grid::from_fn(size, |x, y| super::mean_under(&above, size, (x, y)));
-                of_level(&here, row.rule)
+                filled(size, |x, y| widened(area_mean(&above, size, x, y)))
             }
-        };
-        levels.push(widened);
+        });
     }
     levels
 }

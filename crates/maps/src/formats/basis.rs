@@ -10,6 +10,7 @@ use ndfmap_core::grid::Size;
 use super::Format;
 use super::decoded::guarded;
 use super::ktx2::Container;
+use super::uastc;
 use crate::image::{Orientation, check_size};
 use crate::{Image, MapError, Samples};
 
@@ -27,12 +28,9 @@ const TEXELS_PER_BYTE: usize = 32_768;
 /// Side of a block, of both codecs.
 const SIDE: usize = 4;
 
-/// Bytes of a block of UASTC.
-const UASTC_BLOCK: usize = 16;
-
 /// Colour models of KTX2's data format descriptor.
 const ETC1S: u8 = 163;
-const UASTC: u8 = 166;
+const UASTC: u8 = uastc::COLOUR_MODEL;
 
 /// Flags of a .basis file: the lowest row comes first, and the colours are those of another file.
 const FROM_BELOW: u8 = 2;
@@ -94,7 +92,7 @@ pub(super) fn read_ktx2(
 
 /// File of the first level of UASTC blocks alone, without Zstandard.
 fn decompressed(file: &Container<'_>, descriptor: &[u8], size: Size) -> Result<Vec<u8>, MapError> {
-    let length = size.width.div_ceil(SIDE) * size.height.div_ceil(SIDE) * UASTC_BLOCK;
+    let length = size.width.div_ceil(SIDE) * size.height.div_ceil(SIDE) * uastc::BLOCK_BYTES;
     let level = file.level(0, length as u64)?;
     let start = KtxHeader::LENGTH + LevelIndex::LENGTH;
     let index = Index {

@@ -9,6 +9,12 @@
 use ndfmap_core::grid::Grid;
 use rayon::prelude::*;
 
+/// Bytes of a block.
+pub(super) const BLOCK_BYTES: usize = 16;
+
+/// Colour model of KTX2's data format descriptor.
+pub(super) const COLOUR_MODEL: u8 = 166;
+
 /// Texels of a block.
 const TEXELS: usize = 16;
 
@@ -127,7 +133,7 @@ pub(super) fn pack(level: &Grid<[u8; 4]>) -> Vec<u8> {
         };
         pack_block(&std::array::from_fn(texel), &modes).to_le_bytes()
     };
-    let blocks: Vec<[u8; 16]> = (0..across * down).into_par_iter().map(block).collect();
+    let blocks: Vec<[u8; BLOCK_BYTES]> = (0..across * down).into_par_iter().map(block).collect();
     blocks.as_flattened().to_vec()
 }
 

@@ -6,17 +6,16 @@
 
 use std::sync::LazyLock;
 
+use glam::{DVec3, Vec3};
 use ndfmap_core::brdf::{AnyLobe, Brdf, Directions, Ggx, Microfacets, ShadingModel};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::SplitSum;
 use ndfmap_core::light::environment::{FilteredEnvironment, Technique, builtin};
 use ndfmap_core::observe::{Cancelled, Observer};
-use ndfmap_core::roughness::{EngineMaterial, LEAST_ROUGHNESS, Mean, RoughSurface};
+use ndfmap_core::roughness::{EngineMaterial, LEAST_ROUGHNESS, RoughSurface};
 use ndfmap_core::surface::unit_or_up;
 use ndfmap_core::units::{PerceptualRoughness, SlopeVariance};
 use ndfmap_scene::metrics::{Picture, flip, relative_l2};
-
-use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -89,7 +88,8 @@ impl Room {
     }
 
     /// Light of a normal.
-    fn lit(&self, lobe: &SplitSum, material: EngineMaterial, (n, wo): (DVec3, DVec3), roughness: f64) -> f64 {
+    fn lit(&self, engine: &Engine, n: DVec3, wo: DVec3, roughness: f64) -> f64 {
+        let Engine { material, lobe } = engine;
         let width = SlopeVariance::clamped(roughness.max(LEAST_ROUGHNESS).powi(4) / 2.0);
         let eye = n.dot(wo).clamp(0.0, 1.0);
         let cube = self.filtered.prefiltered(Microfacets::Ggx);
@@ -144,17 +144,18 @@ pub fn judge(
     candidates: &[&[Grid<f32>]],
     observer: &dyn Observer,
 ) -> Result<Vec<LevelErrors>, Cancelled> {
-    let (means, settings) = (surface.means(), settings(&BUILT_ROOMS));
+    let settings = settings(&BUILT_ROOMS);
     let facets =
         Brdf::new(AnyLobe::from(Ggx::new(PerceptualRoughness::SMOOTHEST.into())), ShadingModel::Smith);
     let engine = Engine { material, lobe: SplitSum::new(&facets) };
     let mut levels = Vec::new();
-    for level in 1..means.len() {
+    let last = surface.sizes().len() - 1;
+    for level in 1..=last {
         observer.check()?;
         let of_level: Vec<&Grid<f32>> = candidates.iter().map(|levels| &levels[level]).collect();
-        let pictures = Pictures::shade(surface, &engine, &settings, (&means[level], &of_level));
+        let pictures = Pictures::shade(surface, &engine, &settings, level, &of_level);
         levels.push(LevelErrors { level, candidates: pictures.errors() });
-        observer.progress(level as f64 / (means.len() - 1) as f64);
+        observer.progress(level as f64 / last as f64);
     }
     Ok(levels)
 }
@@ -169,30 +170,22 @@ struct Engine {
 impl Engine {
     fn lit(&self, n: DVec3, roughness: f64, setting: &Setting<'_>) -> f64 {
         let sun = setting.sun.map_or(0.0, |(path, power)| power * self.material.shade(n, roughness, &path));
-        let room =
-            setting.room.map_or(0.0, |room| room.lit(&self.lobe, self.material, (n, setting.wo), roughness));
+        let room = setting.room.map_or(0.0, |room| room.lit(self, n, setting.wo, roughness));
         sun + room
     }
 }
 
 /// Corner of the part of a level whose normals are spread most, among parts side by side.
-fn busiest(means: &Grid<Mean>, part: Size) -> (usize, usize) {
-    let level = means.size();
+fn busiest(surface: &RoughSurface, level: usize, size: Size, part: Size) -> (usize, usize) {
     let spread = |(x, y): (usize, usize)| -> f64 {
-        let row = |j: usize| means.row(j)[x..x + part.width].iter();
-        (y..y + part.height).flat_map(row).map(|mean| f64::from(1.0 - mean.normal.length())).sum()
+        let texels = (y..y + part.height).flat_map(|j| (x..x + part.width).map(move |i| (i, j)));
+        texels.map(|(i, j)| f64::from(1.0 - surface.mean(level, i, j).normal.length())).sum()
     };
-    let across = (0..=level.width - part.width).step_by(part.width);
-    let mut best = (f64::NEG_INFINITY, (0, 0));
-    for x in across {
-        for y in (0..=level.height - part.height).step_by(part.height) {
-            let found = spread((x, y));
-            if found > best.0 {
-                best = (found, (x, y));
-            }
-        }
-    }
-    best.1
+    let along = |whole: usize, part: usize| (0..=whole - part).step_by(part);
+    let corners =
+        along(size.height, part.height).flat_map(|y| along(size.width, part.width).map(move |x| (x, y)));
+    let parts = corners.map(|corner| (spread(corner), corner));
+    parts.max_by(|a, b| a.0.total_cmp(&b.0)).map_or((0, 0), |(_, corner)| corner)
 }
 
 /// Pictures of a level for each setting, grey.
@@ -207,20 +200,21 @@ impl Pictures {
         surface: &RoughSurface,
         engine: &Engine,
         settings: &[Setting<'_>],
-        (means, candidates): (&Grid<Mean>, &[&Grid<f32>]),
+        level: usize,
+        candidates: &[&Grid<f32>],
     ) -> Self {
-        let level = means.size();
-        let size = Size { width: level.width.min(SIDE), height: level.height.min(SIDE) };
-        let corner = busiest(means, size);
+        let whole = candidates[0].size();
+        let size = Size { width: whole.width.min(SIDE), height: whole.height.min(SIDE) };
+        let corner = busiest(surface, level, whole, size);
         // The whole level may be larger than the part of it that is seen.
-        let stride = surface.stride(level, SAMPLES * level.area() / size.area());
+        let stride = surface.stride(whole, SAMPLES * whole.area() / size.area());
         let pixel = |i: usize| -> Vec<Vec<f64>> {
             let (x, y) = (corner.0 + i % size.width, corner.1 + i / size.width);
             let mut samples = Vec::new();
-            surface.under(level, (x, y), stride, |weight, n, r| {
-                samples.push((f64::from(weight), n.as_dvec3(), f64::from(r)));
+            surface.under(whole, (x, y), stride, |weight, texel| {
+                samples.push((f64::from(weight), texel.normal.as_dvec3(), f64::from(texel.roughness)));
             });
-            let n = unit_or_up(means.row(y)[x].normal).as_dvec3();
+            let n = unit_or_up(surface.mean(level, x, y).normal).as_dvec3();
             let of_setting = |setting: &Setting<'_>| {
                 let truth = samples.iter().map(|(weight, n, r)| weight * engine.lit(*n, *r, setting)).sum();
                 let shaded = candidates.iter().map(|r| engine.lit(n, f64::from(r.row(y)[x]), setting));
@@ -236,21 +230,21 @@ impl Pictures {
         let settings = self.values[0].len();
         let count = self.values[0][0].len() - 1;
         // Small levels fill the picture by repeating, as they would on a surface.
-        let picture = |setting: usize, which: usize, scale: f64| -> Picture {
+        let picture = |setting: usize, which: usize| -> Picture {
             Grid::from_fn(Size { width: SIDE, height: SIDE }, |x, y| {
                 let at = y % self.size.height * self.size.width + x % self.size.width;
-                Vec3::splat((scale * self.values[at][setting][which]) as f32)
+                Vec3::splat(self.values[at][setting][which] as f32)
             })
         };
         let of_setting = |setting: usize| -> Vec<Errors> {
-            let truth = picture(setting, 0, 1.0);
+            let truth = picture(setting, 0);
             let mean = truth.texels().iter().map(|v| f64::from(v.x)).sum::<f64>() / (SIDE * SIDE) as f64;
             if mean <= 0.0 {
                 return vec![Errors::default(); count];
             }
             let exposure = (MIDDLE / mean) as f32;
             let errors = |which: usize| {
-                let shaded = picture(setting, which, 1.0);
+                let shaded = picture(setting, which);
                 Errors { relative_l2: relative_l2(&shaded, &truth), flip: flip(&shaded, &truth, exposure) }
             };
             (1..=count).map(errors).collect()

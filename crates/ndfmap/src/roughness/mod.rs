@@ -5,12 +5,12 @@
 //! use ndfmap::core::observe::Unobserved;
 //! use ndfmap::core::roughness::{EngineMaterial, RoughSurface};
 //! use ndfmap::maps::source::{SourceOptions, read_source};
-//! use ndfmap::roughness::{Method, RoughnessJob};
+//! use ndfmap::roughness::RoughnessJob;
 //!
 //! let map = read_source("bricks_normal.png".as_ref(), &SourceOptions::default())?;
 //! let surface = RoughSurface::new(&*map.surface, &Grid::from_fn(map.surface.size(), |_, _| 0.4))?;
-//! let job = RoughnessJob { surface: &surface, material: EngineMaterial::METAL, method: Method::Measured };
-//! let mips = job.run(&Unobserved)?;
+//! let job = RoughnessJob { surface: &surface, material: EngineMaterial::METAL, rule: None };
+//! let mips = job.run(observer)?;
 //! println!("{} levels", mips.levels.len());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -19,20 +19,17 @@ mod judge;
 
 use std::fmt;
 
-use glam::Vec4;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::observe::{Cancelled, Observer};
-use ndfmap_core::pyramid::level_sizes;
 use ndfmap_core::roughness::{
-    EngineMaterial, Objective, RoughSurface, Row, TABLE, Widening, enlarged, find, mean_under,
+    EngineMaterial, Objective, PLAIN, RoughSurface, Row, TABLE, Widening, enlarged, mips,
 };
-use ndfmap_core::surface::Wrap;
-use ndfmap_maps::Image;
+use ndfmap_core::surface::Wraps;
 use serde::{Serialize, Serializer};
 
 pub use judge::{Errors, LevelErrors, judge};
 
-/// Fits that [`Method::Measured`] tries. A power of 1/4 serves FLIP, and 1 relative L2; where a whole one
+/// Fits that are tried. A power of 1/4 serves FLIP, and 1 relative L2; where a whole one
 /// raises a haze that FLIP punishes, a part of it may still help.
 pub const FITS: [Fit; 5] = [
     Fit { objective: Objective { power: 0.25 }, share: 0.25 },
@@ -41,9 +38,6 @@ pub const FITS: [Fit; 5] = [
     Fit { objective: Objective { power: 0.5 }, share: 1.0 },
     Fit { objective: Objective { power: 1.0 }, share: 1.0 },
 ];
-
-/// Name of the rule that mips are compared with: that of every engine.
-const STOCK: &str = "plain";
 
 /// Fit of which a share is taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,18 +48,6 @@ pub struct Fit {
     pub share: f32,
 }
 
-/// Method by which roughness mips are made.
-#[derive(Clone, Copy, Debug)]
-pub enum Method {
-    /// For each level, whichever of [`FITS`], engines' formulas and plain mips is measured to be best; never
-    /// one that is worse than plain mips by either measure.
-    Measured,
-    /// One fit, whatever it does.
-    Fit(Fit),
-    /// The formula of an engine, whatever it does.
-    Rule(&'static Row),
-}
-
 /// Roughness mips to be made.
 #[derive(Clone, Copy, Debug)]
 pub struct RoughnessJob<'a> {
@@ -73,25 +55,24 @@ pub struct RoughnessJob<'a> {
     pub surface: &'a RoughSurface,
     /// Material that the mips are judged by.
     pub material: EngineMaterial,
-    /// Method by which they are made.
-    pub method: Method,
+    /// Formula by which they are made, whatever it does. Without one, each level takes whichever of [`FITS`],
+    /// engines' formulas and plain mips is measured to be best; never one that is worse than plain mips by
+    /// either measure.
+    pub rule: Option<&'static Row>,
 }
 
 /// Source of a level's roughness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Origin {
-    /// Plain mips: nothing that was tried is better.
-    Plain,
     /// A fit.
     Fit(Fit),
-    /// The formula of an engine.
+    /// A formula, by its name; `plain` where nothing that was tried is better.
     Rule(&'static str),
 }
 
 impl fmt::Display for Origin {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Plain => f.write_str(STOCK),
             Self::Fit(Fit { objective: Objective { power }, share: 1.0 }) => write!(f, "fit:{power}"),
             Self::Fit(Fit { objective: Objective { power }, share }) => write!(f, "fit:{power}:{share}"),
             Self::Rule(name) => f.write_str(name),
@@ -125,7 +106,7 @@ pub struct LevelReport {
 /// Errors of something that was tried, over those of stock mips: means over levels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Tried {
-    /// What was tried.
+    /// Fit or formula that was tried.
     pub by: Origin,
     /// Errors over those of stock mips.
     pub of_stock: Errors,
@@ -138,7 +119,7 @@ pub struct RoughnessReport {
     pub levels: Vec<LevelReport>,
     /// Errors of the mips over those of stock mips: means over levels.
     pub of_stock: Errors,
-    /// The same of everything that was tried, on all levels alike.
+    /// Everything that was tried, on all levels alike.
     pub tried: Vec<Tried>,
 }
 
@@ -157,64 +138,55 @@ impl RoughnessJob<'_> {
     /// # Errors
     /// [`Cancelled`] when the observer wants it to end.
     pub fn run(&self, observer: &dyn Observer) -> Result<RoughnessMips, Cancelled> {
-        let rule =
-            |name: &str| Widening::Rule(find(name).unwrap_or_else(|| unreachable!("a row of the table")));
-        let mut origins = vec![Origin::Plain];
-        match self.method {
-            Method::Measured => {
-                origins.extend(FITS.map(Origin::Fit));
-                origins
-                    .extend(TABLE.iter().filter(|row| row.name != STOCK).map(|row| Origin::Rule(row.name)));
-            }
-            Method::Fit(fit) => origins.push(Origin::Fit(fit)),
-            Method::Rule(row) => origins.push(Origin::Rule(row.name)),
-        }
+        let surface = self.surface;
         observer.begin("roughness");
-        let mut made = vec![self.surface.bake(rule(STOCK), &observer.part(0.0, 0.0))?];
-        // Several shares of a fit need it once.
-        let mut fitted: Option<(Objective, Vec<Grid<f32>>)> = None;
-        for (i, origin) in origins.iter().enumerate().skip(1) {
-            let last = (origins.len() - 1) as f64;
-            let part = observer.part(0.5 * (i - 1) as f64 / last, 0.5 * i as f64 / last);
-            let levels = match origin {
-                Origin::Fit(Fit { objective, share }) => {
-                    let whole = match fitted.take().filter(|(made, _)| made == objective) {
+        let by =
+            |row: &'static Row| Ok((Origin::Rule(row.name), surface.bake(Widening::Rule(row), observer)?));
+        let mut made = vec![by(&PLAIN)?];
+        match self.rule {
+            Some(row) => made.push(by(row)?),
+            None => {
+                // Several shares of a fit need it once.
+                let mut whole: Option<(Objective, Vec<Grid<f32>>)> = None;
+                for (i, fit) in FITS.into_iter().enumerate() {
+                    let (from, to) = (i as f64 / FITS.len() as f64, (i + 1) as f64 / FITS.len() as f64);
+                    let levels = match whole.take().filter(|(objective, _)| *objective == fit.objective) {
                         Some((_, levels)) => levels,
-                        None => self.surface.bake(Widening::Fit(*objective), &part)?,
+                        None => surface
+                            .bake(Widening::Fit(fit.objective), &observer.part(0.5 * from, 0.5 * to))?,
                     };
-                    let levels = partly(&made[0], &whole, *share);
-                    fitted = Some((*objective, whole));
-                    levels
+                    made.push((Origin::Fit(fit), partly(&made[0].1, &levels, fit.share)));
+                    whole = Some((fit.objective, levels));
                 }
-                Origin::Rule(name) => self.surface.bake(rule(name), &part)?,
-                Origin::Plain => continue,
-            };
-            made.push(levels);
+                for row in TABLE.iter().filter(|row| row.name != PLAIN.name) {
+                    made.push(by(row)?);
+                }
+            }
         }
-        let all: Vec<&[Grid<f32>]> = made.iter().map(|levels| &levels[..]).collect();
-        let judged = judge(self.surface, self.material, &all, &observer.part(0.5, 1.0))?;
-        let mut levels = vec![made[0][0].clone()];
+        let all: Vec<&[Grid<f32>]> = made.iter().map(|(_, levels)| &levels[..]).collect();
+        let judged = judge(surface, self.material, &all, &observer.part(0.5, 1.0))?;
+        let mut levels = vec![made[0].1[0].clone()];
         let mut report = Vec::new();
         for LevelErrors { level, candidates: errors } in &judged {
-            let (level, chosen) =
-                (*level, if matches!(self.method, Method::Measured) { best(errors) } else { 1 });
-            levels.push(made[chosen][level].clone());
+            let chosen = if self.rule.is_some() { 1 } else { best(errors) };
+            let (by, mips) = &made[chosen];
+            levels.push(mips[*level].clone());
             report.push(LevelReport {
-                level,
-                by: origins[chosen],
-                stock_roughness: mean_of(&made[0][level]),
-                made_roughness: mean_of(&made[chosen][level]),
+                level: *level,
+                by: *by,
+                stock_roughness: mean_of(&made[0].1[*level]),
+                made_roughness: mean_of(&mips[*level]),
                 stock: errors[0],
                 made: errors[chosen],
             });
         }
-        let tried = |(i, by): (usize, &Origin)| Tried {
+        let tried = |(i, (by, _)): (usize, &(Origin, Vec<Grid<f32>>))| Tried {
             by: *by,
             of_stock: mean_ratios(judged.iter().map(|level| (level.candidates[i], level.candidates[0]))),
         };
         let report = RoughnessReport {
             of_stock: mean_ratios(report.iter().map(|level| (level.made, level.stock))),
-            tried: origins.iter().enumerate().skip(1).map(tried).collect(),
+            tried: made.iter().enumerate().skip(1).map(tried).collect(),
             levels: report,
         };
         Ok(RoughnessMips { levels, report })
@@ -226,7 +198,7 @@ fn partly(from: &[Grid<f32>], to: &[Grid<f32>], share: f32) -> Vec<Grid<f32>> {
     let mixed = |(from, to): (&Grid<f32>, &Grid<f32>)| {
         Grid::from_fn(from.size(), |x, y| {
             let (from, to) = (from.row(y)[x], to.row(y)[x]);
-            // What does not change keeps its bits.
+            // A value that does not change keeps its bits.
             if share == 1.0 || from == to {
                 return to;
             }
@@ -269,29 +241,9 @@ fn mean_ratios(pairs: impl Iterator<Item = (Errors, Errors)>) -> Errors {
     Errors { relative_l2: mean(|e| e.relative_l2), flip: mean(|e| e.flip) }
 }
 
-/// Channels of a picture (missing ones 0, alpha 1) as plain mips, from a size that is at least the picture's
-/// own; it is enlarged where it is smaller, and repeats.
+/// Channels of a picture as plain mips, from a size that is at least the picture's own; it is enlarged where
+/// it is smaller, and repeats.
 #[must_use]
-pub fn channel_mips(image: &Image, size: Size) -> Vec<Grid<[f32; 4]>> {
-    let own = image.size;
-    let at = |x: isize, y: isize| {
-        let texel = Wrap::Repeat.index(y, own.height) * own.width + Wrap::Repeat.index(x, own.width);
-        let mut value = [0.0, 0.0, 0.0, 1.0];
-        for (c, value) in value.iter_mut().enumerate().take(image.channels) {
-            *value = image.samples.get(texel * image.channels + c);
-        }
-        Vec4::from_array(value)
-    };
-    let mut levels = vec![if own == size {
-        Grid::from_fn(size, |x, y| at(x as isize, y as isize))
-    } else {
-        enlarged(own, size, at)
-    }];
-    for size in level_sizes(size).into_iter().skip(1) {
-        let above = &levels[levels.len() - 1];
-        let next = Grid::from_fn(size, |x, y| mean_under(above, size, (x, y)));
-        levels.push(next);
-    }
-    let plain = |level: Grid<Vec4>| Grid::from_fn(level.size(), |x, y| level.row(y)[x].to_array());
-    levels.into_iter().map(plain).collect()
+pub fn channel_mips(values: Grid<[f32; 4]>, size: Size) -> Vec<Grid<[f32; 4]>> {
+    mips(if values.size() == size { values } else { enlarged(&values, size, Wraps::default()) })
 }

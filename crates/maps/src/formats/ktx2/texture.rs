@@ -4,7 +4,7 @@ use std::path::Path;
 
 use ::ktx2::dfd::{Basic, Block};
 use ::ktx2::{Format as VkFormat, SupercompressionScheme};
-use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::grid::Grid;
 use ndfmap_core::words;
 use rayon::prelude::*;
 
@@ -31,22 +31,53 @@ pub struct Texture {
     pub levels: Vec<Grid<[u8; 4]>>,
 }
 
-/// Bytes of a block of UASTC, and its side.
-const BLOCK: u64 = 16;
-
 /// Descriptor of UASTC with three channels (Khronos Data Format Specification 1.3, section 5.6.16): version
-/// 2, 40 bytes, colour model 166, primaries of BT.709, linear, blocks of 4 × 4 texels and 16 bytes, one
+/// 2, 40 bytes, its colour model, primaries of BT.709, linear, blocks of 4 × 4 texels and 16 bytes, one
 /// sample of 128 bits, from 0 to all bits.
 const UASTC_DESCRIPTOR: [u8; 40] = [
-    0, 0, 0, 0, 2, 0, 40, 0, 166, 1, 1, 0, 3, 3, 0, 0, 16, 0, 0, 0, 0, 0, 0, 0, 0, 0, 127, 0, 0, 0, 0, 0, 0,
-    0, 0, 0, 255, 255, 255, 255,
+    0,
+    0,
+    0,
+    0,
+    2,
+    0,
+    40,
+    0,
+    uastc::COLOUR_MODEL,
+    1,
+    1,
+    0,
+    3,
+    3,
+    0,
+    0,
+    16,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    127,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    255,
+    255,
+    255,
+    255,
 ];
 
 impl Texture {
-    fn size(&self) -> Size {
-        self.levels[0].size()
-    }
-
     /// Stored bytes of a level, before they are compressed.
     fn encoded(level: &Grid<[u8; 4]>, encoding: TextureEncoding) -> Vec<u8> {
         match encoding {
@@ -127,7 +158,7 @@ impl Texture {
         levels: &[Vec<u8>],
     ) -> Result<Content, MapError> {
         let (format, descriptor, alignment) = match encoding {
-            TextureEncoding::Uastc => (None, UASTC_DESCRIPTOR.to_vec(), BLOCK),
+            TextureEncoding::Uastc => (None, UASTC_DESCRIPTOR.to_vec(), uastc::BLOCK_BYTES as u64),
             TextureEncoding::Rgba8 => {
                 let format = VkFormat::R8G8B8A8_UNORM;
                 let (basic, _) =
@@ -139,7 +170,7 @@ impl Texture {
             format,
             type_size: 1,
             descriptor,
-            size: self.size(),
+            size: self.levels[0].size(),
             layers: 0,
             alignment,
             levels: levels.iter().map(|level| level.len() as u64).collect(),
@@ -151,6 +182,8 @@ impl Texture {
 #[cfg(all(test, feature = "basis"))]
 mod tests {
     use basisu::{DecodeFlags, TargetFormat, Transcoder};
+
+    use ndfmap_core::grid::Size;
 
     use super::*;
 
