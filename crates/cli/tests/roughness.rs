@@ -10,7 +10,7 @@ use ndfmap::core::observe::Unobserved;
 use ndfmap::core::roughness::{EngineMaterial, RoughSurface, TABLE, find};
 use ndfmap::maps::Image;
 use ndfmap::maps::formats::read_image;
-use ndfmap::roughness::{Method, Origin, RoughnessJob};
+use ndfmap::roughness::{Origin, RoughnessJob};
 
 fn read(path: &std::path::Path) -> Image {
     read_image(path, &std::fs::read(path).unwrap()).unwrap()
@@ -43,9 +43,10 @@ fn measured_mips_are_never_worse_than_plain_ones_and_the_same_on_any_threads() {
             assert!(level["made"][measure].as_f64() <= level["stock"][measure].as_f64(), "{level}");
         }
     }
-    // Foil is what one lobe can help: crumples without a direction.
-    assert!(told["of_stock"]["relative_l2"].as_f64().unwrap() < 0.8, "{}", told["of_stock"]);
-    assert!(told["of_stock"]["flip"].as_f64().unwrap() < 0.9, "{}", told["of_stock"]);
+    // Foil is a case for one lobe: crumples without a direction. Measured 0.285 and 0.537; another judge or
+    // another fit may move them a little.
+    assert!(told["of_stock"]["relative_l2"].as_f64().unwrap() < 0.3, "{}", told["of_stock"]);
+    assert!(told["of_stock"]["flip"].as_f64().unwrap() < 0.56, "{}", told["of_stock"]);
     let image = read(&file("one.ktx2"));
     assert_eq!((image.size, image.channels), (Size { width: 64, height: 64 }, 3));
     // The finest level is what it was: 0.3 of 255, rounded.
@@ -78,9 +79,14 @@ fn channels_gloss_and_packing_are_kept() {
     // Metal is a plain mean; rougher is less smooth.
     assert_eq!(coarsest.channels, 4);
     assert!((coarsest.samples.get(0) - 0.5).abs() < 0.5 / 255.0 + 1e-6, "{}", coarsest.samples.get(0));
-    assert!(coarsest.samples.get(3) < 0.7, "{}", coarsest.samples.get(3));
+    // The flanks' mean is as long as their z. By `kappa` alpha² gains 2/kappa; bytes round.
+    let length = 0.8_f64;
+    let inverse_kappa = (1.0 - length * length) / (3.0 * length - length.powi(3));
+    let rough = ((1.0 - 200.0 / 255.0_f64).powi(4) + 2.0 * inverse_kappa).powf(0.25);
+    let got = f64::from(coarsest.samples.get(3));
+    assert!((got - (1.0 - rough)).abs() < 1.0 / 255.0, "{got} {rough}");
     let (status, _, stderr) = run(&[&smooth[..], &["-o", &text(&file("unity.ktx2"))]].concat());
-    assert!(status == 1 && stderr.contains("rgba8"), "{stderr}");
+    assert!(status == 2 && stderr.contains("rgba8"), "{stderr}");
     let rgba = text(&file("unity.ktx2"));
     let (status, _, stderr) = run(&[&smooth[..], &["--encoding", "rgba8", "-o", &rgba]].concat());
     assert_eq!(status, 0, "{stderr}");
@@ -107,7 +113,7 @@ fn requests_that_cannot_be_met_are_refused() {
         (vec!["--roughness", "missing.png", "-o", &out], 1, "missing.png"),
         (vec!["--rule", "magic", "-o", &out], 2, "plain, kappa"),
         (vec!["--level", "1", "-o", &out], 2, "holds all levels"),
-        (vec!["--zstd", "3", "-o", &png_out], 2, "neither"),
+        (vec!["--zstd=3", "-o", &png_out], 2, "neither"),
         (vec!["--level", "9", "-o", &png_out], 2, "there is no level 9"),
         (vec!["-o", "out.tga"], 2, ".ktx2 or .png"),
     ] {
@@ -123,8 +129,8 @@ fn every_rule_is_measured_beside_plain_mips() {
     let foil = (ndfmap::core::procedural::find("foil").unwrap().build)(Size { width: 32, height: 32 });
     let surface = RoughSurface::new(&*foil, &Grid::from_fn(foil.size(), |_, _| 0.3)).unwrap();
     for row in TABLE {
-        let method = Method::Rule(find(row.name).unwrap());
-        let job = RoughnessJob { surface: &surface, material: EngineMaterial::DIELECTRIC, method };
+        let job =
+            RoughnessJob { surface: &surface, material: EngineMaterial::DIELECTRIC, rule: find(row.name) };
         let mips = job.run(&Unobserved).unwrap();
         assert_eq!(mips.levels.len(), 6);
         for level in &mips.report.levels {

@@ -66,6 +66,9 @@ pub(super) struct BuiltinSize {
     pub(super) map_size: Option<Size>,
 }
 
+/// Level of Zstandard, unless told otherwise: the library's own default.
+pub(super) const ZSTD: i32 = 3;
+
 /// Name that stands for stdin and stdout.
 pub(super) const STANDARD: &str = "-";
 

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::arguments::{
-    BuiltinSize, Precision, STANDARD, SourceArguments, brdf_spelling, method_spelling, methods_help,
+    BuiltinSize, Precision, STANDARD, SourceArguments, ZSTD, brdf_spelling, method_spelling, methods_help,
     positive, read_brdf,
 };
 use super::{make_folder, make_way, print, print_json};
@@ -103,9 +103,6 @@ fn attribute_path(text: &str) -> Result<AttributePath, String> {
 fn method_or_auto(text: &str) -> Result<String, String> {
     if text.eq_ignore_ascii_case(AUTO) { Ok(AUTO.to_owned()) } else { method_spelling(text) }
 }
-
-/// Level of Zstandard, unless told otherwise: the library's own default.
-const ZSTD: i32 = 3;
 
 /// Lobe that `auto` measures with, unless told otherwise.
 const AUTO_LOBE: &str = "blinn-phong:50";

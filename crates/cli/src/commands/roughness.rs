@@ -1,19 +1,23 @@
 //! `ndfmap roughness`: a normal map and a roughness in, roughness mips for any engine out.
 
 use std::path::{Path, PathBuf};
+use std::str::FromStr as _;
 
-use super::arguments::{BuiltinSize, SourceArguments};
-use super::{make_way, print, print_json, say_written, to_value};
-use crate::tables;
-use crate::terminal::Terminal;
 use clap::{Args, ValueEnum};
 use ndfmap::Error;
 use ndfmap::core::grid::{Grid, Size};
+use ndfmap::core::pyramid::level_sizes;
 use ndfmap::core::roughness::{EngineMaterial, RoughSurface, TABLE, find};
+use ndfmap::maps::attribute::{Transfer, attribute_of_image};
 use ndfmap::maps::formats::ktx2::{Texture, TextureEncoding};
 use ndfmap::maps::formats::{read_file, read_image};
-use ndfmap::maps::{Image, MapError, atomic};
-use ndfmap::roughness::{Method, RoughnessJob, RoughnessMips, channel_mips};
+use ndfmap::maps::{MapError, atomic};
+use ndfmap::roughness::{RoughnessJob, RoughnessMips, channel_mips};
+
+use super::arguments::{BuiltinSize, SourceArguments, ZSTD};
+use super::{make_way, print, print_json, say_written, to_value};
+use crate::tables;
+use crate::terminal::Terminal;
 
 /// Make roughness mips that keep a material's look with distance, for any engine
 #[derive(Debug, Args)]
@@ -47,11 +51,13 @@ pub(super) struct Roughness {
     /// For `.png`: this level alone, under the name as it is
     #[arg(long, value_name = "N")]
     level: Option<usize>,
-    /// For `.ktx2`: UASTC, the format of glTF's `KHR_texture_basisu`, or four bytes a texel [default: uastc]
-    #[arg(long, value_enum, ignore_case = true)]
-    encoding: Option<Encoding>,
+    /// For `.ktx2`: `uastc`, the format of glTF's `KHR_texture_basisu`, or `rgba8`, four bytes a texel
+    /// [default: uastc]
+    #[arg(long, value_parser = TextureEncoding::from_str)]
+    encoding: Option<TextureEncoding>,
     /// For `.ktx2`: level of Zstandard, from 1 (fast) to 22; 0 writes it plain [default: 3]
-    #[arg(long, value_name = "LEVEL", value_parser = clap::value_parser!(i32).range(0..=22))]
+    #[arg(long, value_name = "LEVEL", num_args = 0..=1, require_equals = true, default_missing_value = "3",
+        value_parser = clap::value_parser!(i32).range(0..=22))]
     zstd: Option<i32>,
     #[command(flatten)]
     source: SourceArguments,
@@ -79,15 +85,6 @@ enum Material {
     Dielectric,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Encoding {
-    Uastc,
-    Rgba8,
-}
-
-/// Level of Zstandard, unless told otherwise.
-const ZSTD: i32 = 3;
-
 fn rule_name(text: &str) -> Result<String, String> {
     find(text).map(|row| row.name.to_owned()).ok_or_else(|| {
         let names: Vec<&str> = TABLE.iter().map(|row| row.name).collect();
@@ -102,10 +99,12 @@ fn rules_help() -> String {
 
 /// Roughness as it was given.
 struct Given {
-    /// Values of the channel, as stored.
-    values: Grid<f32>,
-    /// Picture whose other channels are kept, and the channel.
-    others: Option<(Image, usize)>,
+    /// Values of the picture, or the number in every channel.
+    values: Grid<[f32; 4]>,
+    /// Channel of them that is roughness.
+    channel: usize,
+    /// True where the other channels are to be kept.
+    keeps_others: bool,
 }
 
 impl Roughness {
@@ -113,20 +112,36 @@ impl Roughness {
         let png = self.check()?;
         let map = self.source.read(&self.map, &self.builtin)?;
         let given = self.given(map.surface.size())?;
-        let roughness = Grid::from_fn(given.values.size(), |x, y| self.rough(given.values.row(y)[x]));
+        let stored = |x: usize, y: usize| given.values.row(y)[x][given.channel];
+        let roughness = Grid::from_fn(given.values.size(), |x, y| self.rough(stored(x, y)));
         let surface = RoughSurface::new(&*map.surface, &roughness)
             .map_err(|e| MapError::invalid(Path::new(&self.roughness), e.to_string()))?;
         let material = match self.material {
             Material::Metal => EngineMaterial::METAL,
             Material::Dielectric => EngineMaterial::DIELECTRIC,
         };
-        let method = self.rule.as_deref().and_then(find).map_or(Method::Measured, Method::Rule);
-        let terminal = Terminal::default();
-        let mips = RoughnessJob { surface: &surface, material, method }.run(&terminal)?;
-        let texture = self.texture(&mips, &given);
-        let written = if png { self.save_png(&texture)? } else { vec![self.save_ktx2(&texture)?] };
+        // Before the work, which takes seconds.
+        let outputs = if png { self.pictures(surface.size())? } else { vec![(0, self.output.clone())] };
+        outputs.iter().try_for_each(|(_, path)| make_way(path))?;
+        let rule = self.rule.as_deref().and_then(find);
+        let mips = RoughnessJob { surface: &surface, material, rule }.run(&Terminal::default())?;
+        let texture = self.texture(&mips, given);
+        if png {
+            for (level, path) in &outputs {
+                atomic::write(path, &texture.to_png(path, *level)?)?;
+            }
+        } else {
+            let zstd = Some(self.zstd.unwrap_or(ZSTD)).filter(|level| *level > 0);
+            texture.save(&self.output, self.encoding.unwrap_or_default(), zstd)?;
+        }
+        let written: Vec<PathBuf> = outputs.into_iter().map(|(_, path)| path).collect();
         say_written(&written);
-        self.tell(&mips, &written, json)
+        if !json {
+            return print(&tables::roughness(&mips));
+        }
+        let mut value = to_value(&mips.report)?;
+        value["files"] = written.iter().map(|f| f.display().to_string()).collect();
+        print_json(&value)
     }
 
     /// Refuses options that do nothing; true for PNG.
@@ -159,17 +174,17 @@ impl Roughness {
             if self.channel.is_some() {
                 return Err(Error::Request("`--channel` is for a picture of roughness".to_owned()));
             }
-            return Ok(Given { values: Grid::from_fn(size, |_, _| number), others: None });
+            return Ok(Given {
+                values: Grid::from_fn(size, |_, _| [number; 4]),
+                channel: 0,
+                keeps_others: false,
+            });
         }
         let path = Path::new(&self.roughness);
         let image = read_image(path, &read_file(path)?)?;
-        let texel =
-            |x: usize, y: usize, c: usize| image.samples.get((y * image.size.width + x) * image.channels + c);
+        let values = attribute_of_image(path, &image, Transfer::Linear)?.values;
         let colours = image.channels.min(3);
-        let is_grey = (0..image.size.area()).all(|i| {
-            let (x, y) = (i % image.size.width, i / image.size.width);
-            (1..colours).all(|c| texel(x, y, c) == texel(x, y, 0))
-        });
+        let is_grey = values.texels().iter().all(|texel| texel[..colours].iter().all(|v| *v == texel[0]));
         let channel = match self.channel {
             Some(channel) if (channel as usize) < image.channels => channel as usize,
             Some(_) => {
@@ -184,32 +199,38 @@ impl Roughness {
                 return Err(Error::Request(format!("{}: {reason}", path.display())));
             }
         };
-        let values = Grid::from_fn(image.size, |x, y| texel(x, y, channel));
-        let others = (self.channel.is_some() && image.channels > 1).then_some((image, channel));
-        if others.is_some() && self.packing == Packing::Orm {
+        let keeps_others = self.channel.is_some() && image.channels > 1;
+        if keeps_others && self.packing == Packing::Orm {
             return Err(Error::Request(
                 "`--packing orm` is for a roughness without other channels; this picture keeps its own"
                     .to_owned(),
             ));
         }
-        Ok(Given { values, others })
+        let has_alpha = channel == 3 || values.texels().iter().any(|texel| texel[3] != 1.0);
+        let is_uastc = self.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("ktx2"))
+            && self.encoding.unwrap_or_default() == TextureEncoding::Uastc;
+        if keeps_others && has_alpha && is_uastc {
+            return Err(Error::Request(format!(
+                "{}: has an alpha channel, which is not written as UASTC: add `--encoding rgba8`",
+                path.display()
+            )));
+        }
+        Ok(Given { values, channel, keeps_others })
     }
 
     /// Texels of every level.
-    fn texture(&self, mips: &RoughnessMips, given: &Given) -> Texture {
+    fn texture(&self, mips: &RoughnessMips, given: Given) -> Texture {
         let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
-        let others = given
-            .others
-            .as_ref()
-            .map(|(image, channel)| (channel_mips(image, mips.levels[0].size()), *channel));
+        let (channel, size) = (given.channel, mips.levels[0].size());
+        let others = given.keeps_others.then(|| channel_mips(given.values, size));
         let level = |(l, roughness): (usize, &Grid<f32>)| {
             Grid::from_fn(roughness.size(), |x, y| {
                 // The way back is the way there.
                 let stored = byte(self.rough(roughness.row(y)[x]));
                 match (&others, self.packing) {
-                    (Some((others, channel)), _) => {
+                    (Some(others), _) => {
                         let mut texel = others[l].row(y)[x].map(byte);
-                        texel[*channel] = stored;
+                        texel[channel] = stored;
                         texel
                     }
                     (None, Packing::Grey) => [stored, stored, stored, 255],
@@ -220,41 +241,15 @@ impl Roughness {
         Texture { levels: mips.levels.iter().enumerate().map(level).collect() }
     }
 
-    fn save_png(&self, texture: &Texture) -> Result<Vec<PathBuf>, Error> {
-        let last = texture.levels.len() - 1;
-        let levels = match self.level {
-            Some(level) if level > last => {
-                return Err(Error::Request(format!("there is no level {level}; the last is {last}")));
+    /// Levels that are written as pictures, and the file of each.
+    fn pictures(&self, size: Size) -> Result<Vec<(usize, PathBuf)>, Error> {
+        let count = level_sizes(size).len();
+        match self.level {
+            Some(level) if level >= count => {
+                Err(Error::Request(format!("there is no level {level}; the last is {}", count - 1)))
             }
-            Some(level) => vec![(level, self.output.clone())],
-            None => {
-                (0..=last).map(|level| (level, self.output.with_extension(format!("{level}.png")))).collect()
-            }
-        };
-        for (level, path) in &levels {
-            make_way(path)?;
-            atomic::write(path, &texture.to_png(path, *level)?)?;
+            Some(level) => Ok(vec![(level, self.output.clone())]),
+            None => Ok((0..count).map(|l| (l, self.output.with_extension(format!("{l}.png")))).collect()),
         }
-        Ok(levels.into_iter().map(|(_, path)| path).collect())
-    }
-
-    fn save_ktx2(&self, texture: &Texture) -> Result<PathBuf, Error> {
-        let encoding = match self.encoding {
-            Some(Encoding::Rgba8) => TextureEncoding::Rgba8,
-            _ => TextureEncoding::Uastc,
-        };
-        let zstd = Some(self.zstd.unwrap_or(ZSTD)).filter(|level| *level > 0);
-        make_way(&self.output)?;
-        texture.save(&self.output, encoding, zstd)?;
-        Ok(self.output.clone())
-    }
-
-    fn tell(&self, mips: &RoughnessMips, written: &[PathBuf], json: bool) -> Result<(), Error> {
-        if !json {
-            return print(&tables::roughness(mips));
-        }
-        let mut value = to_value(&mips.report)?;
-        value["files"] = written.iter().map(|f| f.display().to_string()).collect();
-        print_json(&value)
     }
 }
