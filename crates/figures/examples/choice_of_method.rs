@@ -4,15 +4,17 @@
 //! `cargo run --release -p ndfmap-figures --example choice_of_method -- FOLDER [LOBE [METHOD,METHOD]]`; the
 //! first method is the one that others are divided by.
 
-use std::path::{Path, PathBuf};
+mod maps;
+
+use std::path::Path;
 
 use ndfmap::compare::{Comparison, Row, Subject, compare};
 use ndfmap::core::brdf::AnyLobe;
 use ndfmap::core::ndf::AnyMethod;
 use ndfmap::core::observe::Unobserved;
 use ndfmap::core::pyramid::Precision;
-use ndfmap::maps::formats::{is_picture, read_file, read_image};
-use ndfmap::maps::source::{Convention, PictureKind, SourceOptions, identify, source_of_image};
+
+use maps::{median, normal_map, pictures};
 
 /// Methods unless told otherwise.
 const METHODS: &str = "toksvig,naive,slopes,vmf:1,vmf:2,vmf:3,vmf:4";
@@ -52,14 +54,7 @@ fn measured(
     methods: &[AnyMethod],
     lobe: &AnyLobe,
 ) -> Result<Option<Comparison>, Box<dyn std::error::Error>> {
-    let image = read_image(path, &read_file(path)?)?;
-    if identify(path, &image).kind != PictureKind::Normal {
-        return Ok(None);
-    }
-    // A map that does not tell where green points has the same errors either way.
-    let auto = source_of_image(path, image.clone(), String::new(), &SourceOptions::default());
-    let up = SourceOptions { convention: Some(Convention::OpenGl), ..SourceOptions::default() };
-    let map = auto.or_else(|_| source_of_image(path, image, String::new(), &up))?;
+    let Some(map) = normal_map(path)? else { return Ok(None) };
     let subject = Subject {
         name: "map",
         surface: &*map.surface,
@@ -72,24 +67,14 @@ fn measured(
     Ok(Some(compare(&subject, &Unobserved)?))
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    if values.len() % 2 == 1 { values[middle] } else { (values[middle - 1] + values[middle]) / 2.0 }
-}
-
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let folder = arguments.next().ok_or("name a folder of normal maps")?;
     let lobe = arguments.next().unwrap_or_else(|| LOBE.to_owned()).parse::<AnyLobe>()?;
     let methods = arguments.next().unwrap_or_else(|| METHODS.to_owned());
     let methods = methods.split(',').map(str::parse::<AnyMethod>).collect::<Result<Vec<_>, _>>()?;
-    let mut files: Vec<PathBuf> =
-        std::fs::read_dir(folder)?.filter_map(|entry| Some(entry.ok()?.path())).collect();
-    files.retain(|file| is_picture(file));
-    files.sort();
     let mut all: Vec<Comparison> = Vec::new();
-    for file in files {
+    for file in pictures(&folder)? {
         if let Some(comparison) = measured(&file, &methods, &lobe)? {
             eprintln!("{}", file.display());
             all.push(comparison);
