@@ -10,7 +10,7 @@
 //! let map = read_source("bricks_normal.png".as_ref(), &SourceOptions::default())?;
 //! let surface = RoughSurface::new(&*map.surface, &Grid::from_fn(map.surface.size(), |_, _| 0.4))?;
 //! let job = RoughnessJob { surface: &surface, material: EngineMaterial::METAL, rule: None };
-//! let mips = job.run(observer)?;
+//! let mips = job.run(&Unobserved)?;
 //! println!("{} levels", mips.levels.len());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
