@@ -9,6 +9,7 @@
 //! weights add up to 1, and derivatives, whose weights add up to 0, do not see the difference.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
+use std::sync::LazyLock;
 
 use glam::{DMat3, DVec2, DVec3};
 use ndfmap_core::grid::{Grid, Size};
@@ -36,8 +37,7 @@ impl PixelsPerDegree {
 /// When the pictures differ in size.
 #[must_use]
 pub fn flip(picture: &Picture, truth: &Picture, exposure: f32) -> f64 {
-    let map = flip_map(picture, truth, exposure);
-    map.texels().iter().map(|e| f64::from(*e)).sum::<f64>() / map.texels().len() as f64
+    FlipTruth::new(truth, exposure).mean(picture)
 }
 
 /// FLIP of every pixel, 0 to 1, between display values in 8 bits on a [`PixelsPerDegree::SCREEN`]. It is
@@ -47,16 +47,52 @@ pub fn flip(picture: &Picture, truth: &Picture, exposure: f32) -> f64 {
 /// When the pictures differ in size.
 #[must_use]
 pub fn flip_map(picture: &Picture, truth: &Picture, exposure: f32) -> Grid<f32> {
-    assert_eq!(picture.size(), truth.size(), "pictures that are compared have one size");
-    let eye = Eye::new(PixelsPerDegree::SCREEN);
-    let [a, b] = [picture, truth].map(|p| eye.see(&to_bytes(p, exposure)));
-    by_rows(picture.size(), |y, row| {
-        let colour = a.colours.row(y).iter().zip(b.colours.row(y)).map(|(a, b)| eye.colour_error(*a, *b));
-        let feature = a.features.row(y).iter().zip(b.features.row(y)).map(|(a, b)| feature_error(*a, *b));
-        for (error, (colour, feature)) in row.iter_mut().zip(colour.zip(feature)) {
-            *error = colour.powf(1.0 - feature) as f32;
-        }
-    })
+    FlipTruth::new(truth, exposure).map(picture)
+}
+
+/// A true picture, as the eye sees it: many pictures are compared with it in half the time.
+pub struct FlipTruth {
+    exposure: f32,
+    seen: Seen,
+}
+
+/// The eye before a [`PixelsPerDegree::SCREEN`].
+static EYE: LazyLock<Eye> = LazyLock::new(|| Eye::new(PixelsPerDegree::SCREEN));
+
+impl FlipTruth {
+    /// Looks at the truth.
+    #[must_use]
+    pub fn new(truth: &Picture, exposure: f32) -> Self {
+        Self { exposure, seen: EYE.see(&to_bytes(truth, exposure)) }
+    }
+
+    /// [`flip_map`] of a picture.
+    ///
+    /// # Panics
+    /// When its size is another.
+    #[must_use]
+    pub fn map(&self, picture: &Picture) -> Grid<f32> {
+        let b = &self.seen;
+        assert_eq!(picture.size(), b.colours.size(), "pictures that are compared have one size");
+        let a = EYE.see(&to_bytes(picture, self.exposure));
+        by_rows(picture.size(), |y, row| {
+            let colour = a.colours.row(y).iter().zip(b.colours.row(y)).map(|(a, b)| EYE.colour_error(*a, *b));
+            let feature = a.features.row(y).iter().zip(b.features.row(y)).map(|(a, b)| feature_error(*a, *b));
+            for (error, (colour, feature)) in row.iter_mut().zip(colour.zip(feature)) {
+                *error = colour.powf(1.0 - feature) as f32;
+            }
+        })
+    }
+
+    /// [`flip`] of a picture.
+    ///
+    /// # Panics
+    /// When its size is another.
+    #[must_use]
+    pub fn mean(&self, picture: &Picture) -> f64 {
+        let map = self.map(picture);
+        map.texels().iter().map(|e| f64::from(*e)).sum::<f64>() / map.texels().len() as f64
+    }
 }
 
 /// Exponent of colour distances, `q_c`.

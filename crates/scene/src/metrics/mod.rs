@@ -5,7 +5,7 @@
 
 mod flip;
 
-pub use flip::{PixelsPerDegree, flip, flip_map};
+pub use flip::{FlipTruth, PixelsPerDegree, flip, flip_map};
 
 use glam::Vec3;
 use ndfmap_core::grid::{Grid, Size};
