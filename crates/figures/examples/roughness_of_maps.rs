@@ -31,7 +31,7 @@ fn measured(
     }
     let flat = Grid::from_fn(size, |_, _| roughness);
     let surface = RoughSurface::new(&*map.surface, &flat)?;
-    let job = RoughnessJob { surface: &surface, material: EngineMaterial::METAL, rule: None };
+    let job = RoughnessJob { surface: &surface, material: EngineMaterial::METAL, by: None };
     Ok(Some(job.run(&Unobserved)?.report))
 }
 

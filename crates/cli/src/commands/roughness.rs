@@ -7,12 +7,12 @@ use clap::{Args, ValueEnum};
 use ndfmap::Error;
 use ndfmap::core::grid::{Grid, Size};
 use ndfmap::core::pyramid::level_sizes;
-use ndfmap::core::roughness::{EngineMaterial, RoughSurface, TABLE, find};
+use ndfmap::core::roughness::{EngineMaterial, RoughSurface, TABLE};
 use ndfmap::maps::attribute::{Transfer, attribute_of_image};
 use ndfmap::maps::formats::ktx2::{Texture, TextureEncoding};
 use ndfmap::maps::formats::{read_file, read_image};
 use ndfmap::maps::{MapError, atomic};
-use ndfmap::roughness::{RoughnessJob, RoughnessMips, channel_mips};
+use ndfmap::roughness::{Origin, ROUGHNESS_IMPORTANCE, RoughnessJob, RoughnessMips, channel_mips};
 
 use super::arguments::{BuiltinSize, SourceArguments, ZSTD};
 use super::{make_way, print, print_json, say_written, to_value};
@@ -39,9 +39,9 @@ pub(super) struct Roughness {
     /// metal)
     #[arg(long, value_enum, ignore_case = true, default_value_t = Packing::Grey)]
     packing: Packing,
-    /// Formula of an engine in place of the fit; `--help` lists them
-    #[arg(long, value_name = "NAME", value_parser = rule_name)]
-    rule: Option<String>,
+    /// Fit or formula of an engine in place of what is measured to be best; `--help` lists them
+    #[arg(long, value_name = "NAME", value_parser = Origin::from_str)]
+    rule: Option<Origin>,
     /// Material that the mips are judged by
     #[arg(long, value_enum, ignore_case = true, default_value_t = Material::Metal)]
     material: Material,
@@ -85,16 +85,13 @@ enum Material {
     Dielectric,
 }
 
-fn rule_name(text: &str) -> Result<String, String> {
-    find(text).map(|row| row.name.to_owned()).ok_or_else(|| {
-        let names: Vec<&str> = TABLE.iter().map(|row| row.name).collect();
-        format!("no rule of this name; there are {}", names.join(", "))
-    })
-}
-
-fn rules_help() -> String {
+pub(super) fn rules_help() -> String {
     let rows = TABLE.iter().map(|row| format!("  {:9} {}", row.name, row.summary));
-    format!("Rules:\n{}", rows.collect::<Vec<_>>().join("\n"))
+    format!(
+        "Rules:\n{}\n  fit:P     the lobe nearest to all of a texel's, in brightness to the power P\n  fit:P:S   \
+         a share S of the way to it, from plain mips",
+        rows.collect::<Vec<_>>().join("\n")
+    )
 }
 
 /// Roughness as it was given.
@@ -123,8 +120,7 @@ impl Roughness {
         // Before the work, which takes seconds.
         let outputs = if png { self.pictures(surface.size())? } else { vec![(0, self.output.clone())] };
         outputs.iter().try_for_each(|(_, path)| make_way(path))?;
-        let rule = self.rule.as_deref().and_then(find);
-        let mips = RoughnessJob { surface: &surface, material, rule }.run(&Terminal::default())?;
+        let mips = RoughnessJob { surface: &surface, material, by: self.rule }.run(&Terminal::default())?;
         let texture = self.texture(&mips, given);
         if png {
             for (level, path) in &outputs {
@@ -238,7 +234,8 @@ impl Roughness {
                 }
             })
         };
-        Texture { levels: mips.levels.iter().enumerate().map(level).collect() }
+        let importance = std::array::from_fn(|c| if c == channel { ROUGHNESS_IMPORTANCE } else { 1.0 });
+        Texture { levels: mips.levels.iter().enumerate().map(level).collect(), importance }
     }
 
     /// Levels that are written as pictures, and the file of each.

@@ -1,12 +1,16 @@
 //! Judge of roughness mips: each level as an engine shades it, beside the mean of the level's own normals.
 //!
-//! A texel of a level is a pixel that sees it at that distance. Its truth is the engine's shading of every
-//! normal under it; stock and fixed materials are the engine's shading of one normal and one roughness. No
-//! filter of an engine is in it, and no geometry: what is judged is the bake alone.
+//! A level is laid on a sphere and on a floor, a texel a pixel, as it is seen from where that level is read.
+//! The truth of a pixel is the engine's shading of every normal under its texel; stock and fixed materials are
+//! the engine's shading of one normal and one roughness. No filter of an engine is in it: what is judged is
+//! the bake alone. Whole objects, because a highlight and the dark beside it are one picture, with one
+//! exposure: a lobe too wide is a haze over the dark. A floor too, because lobes that are right from above
+//! may be too wide where the eye grazes them.
 
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use std::sync::LazyLock;
 
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec2, DVec3, Vec3};
 use ndfmap_core::brdf::{AnyLobe, Brdf, Directions, Ggx, Microfacets, ShadingModel};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::SplitSum;
@@ -15,7 +19,7 @@ use ndfmap_core::observe::{Cancelled, Observer};
 use ndfmap_core::roughness::{EngineMaterial, LEAST_ROUGHNESS, RoughSurface};
 use ndfmap_core::surface::unit_or_up;
 use ndfmap_core::units::{PerceptualRoughness, SlopeVariance};
-use ndfmap_scene::metrics::{Picture, flip, relative_l2};
+use ndfmap_scene::metrics::{FlipTruth, Picture, relative_l2};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -23,19 +27,28 @@ use serde::Serialize;
 const SIDE: usize = 64;
 
 /// Samples that the truth of a picture reads.
-const SAMPLES: usize = 1 << 18;
+const SAMPLES: usize = 1 << 20;
 
 /// Brightness of a picture's mean on the display: its exposure is this over the truth's mean.
 const MIDDLE: f64 = 0.3;
 
-/// Angles of the eye to the surface's normal, in degrees.
-const EYES: [f64; 3] = [10.0, 45.0, 70.0];
+/// Radius of the part of the sphere's disk that is shown, over its own: the rim is seen at 76 degrees.
+const SHOWN: f64 = 0.97;
 
-/// Angles of a sun's half-vector to the surface's normal, and its azimuths, in degrees.
-const SUNS: [(f64, f64); 2] = [(5.0, 40.0), (25.0, 200.0)];
+/// Angles of the eye above the floor, far away and near, and to each side, in degrees.
+const FLOOR: (f64, f64) = (4.0, 40.0);
+const FLOOR_SIDE: f64 = 22.0;
 
-/// Environments, by their names.
-const ROOMS: [&str; 2] = ["studio", "sky"];
+/// Objects, each with a sun of its own and a room: directions to the suns, and names of environments. The
+/// world has x to the right, y up, and z towards the eye, which is level; over the floor the sun stands
+/// behind the horizon.
+const OBJECTS: [(Spots, DVec3, &str); 2] = [
+    (Spot::of_sphere, DVec3::new(2.0, 2.5, 3.0), "studio"),
+    (Spot::of_floor, DVec3::new(-2.5, 2.2, -1.5), "sky"),
+];
+
+/// Spots of an object by the places of pixels, from -1 to 1, right and up, and a sun.
+type Spots = fn(DVec2, DVec3) -> Spot;
 
 /// Irradiance of a sun that shines into a room, over the room's own mean radiance.
 const SUN_IN_ROOM: f64 = 4.0;
@@ -49,33 +62,27 @@ pub struct Errors {
     pub flip: f64,
 }
 
-/// Errors of a level: means over eyes and lights.
+/// Errors of a level by candidates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LevelErrors {
     /// Level, 0 the finest.
     pub level: usize,
-    /// Errors of each candidate, in order.
-    pub candidates: Vec<Errors>,
+    /// Errors of each candidate in each light, in order.
+    pub candidates: Vec<[Errors; PICTURES]>,
 }
 
-/// An eye, and what lights the surface.
-struct Setting<'a> {
-    wo: DVec3,
-    sun: Option<(Directions, f64)>,
-    room: Option<&'a Room>,
-}
+/// Pictures of a level: in a sun, in a room, and in the room that the sun shines into, for each object.
+pub const PICTURES: usize = 3 * OBJECTS.len();
 
-/// Environment, as engines look it up: cubes that GGX facets have blurred, times what the lobe reflects of a
-/// white sky.
+/// Light of one normal in every picture.
+type Lights = [f64; PICTURES];
+
+/// Environment, as engines look it up: cubes that GGX facets have blurred.
 struct Room {
     filtered: FilteredEnvironment,
     /// Mean radiance.
     mean: f64,
 }
-
-/// Every room, blurred once: many materials are judged in the same.
-static BUILT_ROOMS: LazyLock<Vec<Room>> =
-    LazyLock::new(|| ROOMS.iter().filter_map(|name| Room::new(name)).collect());
 
 impl Room {
     fn new(name: &str) -> Option<Self> {
@@ -86,92 +93,175 @@ impl Room {
         let mean = texels.iter().map(|v| f64::from(v.element_sum()) / 3.0).sum::<f64>() / texels.len() as f64;
         Some(Self { filtered, mean })
     }
+}
 
-    /// Light of a normal.
-    fn lit(&self, engine: &Engine, n: DVec3, wo: DVec3, roughness: f64) -> f64 {
-        let Engine { material, lobe } = engine;
-        let width = SlopeVariance::clamped(roughness.max(LEAST_ROUGHNESS).powi(4) / 2.0);
-        let eye = n.dot(wo).clamp(0.0, 1.0);
-        let cube = self.filtered.prefiltered(Microfacets::Ggx);
-        // Up is y in an environment, and out of the surface here.
-        let turned = |w: DVec3| DVec3::new(w.x, w.z, -w.y);
-        let grey = |v: DVec3| v.element_sum() / 3.0;
-        let seen =
-            grey(cube.lookup(turned(2.0 * eye * n - wo), Microfacets::level(width, 1.0, cube.levels())));
-        let reflected = lobe.lookup(eye, width);
-        let specular = seen * (material.specular * grey(reflected.scale) + reflected.bias);
-        if material.diffuse == 0.0 {
-            return specular;
-        }
-        let irradiance = self.filtered.irradiance.of_normals(turned(n), 0.0, false);
-        specular + (1.0 - material.specular) * material.diffuse / std::f64::consts::PI * grey(irradiance)
+/// Spot on an object: what lights and sees it, in the frame of its surface.
+struct Spot {
+    /// Frame of the surface in that of the world.
+    frame: DMat3,
+    wo: DVec3,
+    sun: Option<Directions>,
+}
+
+impl Spot {
+    fn new(frame: DMat3, eye: DVec3, sun: DVec3) -> Self {
+        let inside = |w: DVec3| frame.transpose() * w;
+        let wo = inside(eye);
+        Self { frame, wo, sun: Directions::between(inside(sun.normalize()), wo) }
+    }
+
+    /// Spot of the sphere. The square of the picture is the disk of the sphere, areas kept (Shirley and Chiu
+    /// 1997).
+    fn of_sphere(at: DVec2, sun: DVec3) -> Self {
+        let (u, v) = at.into();
+        let (radius, angle) =
+            if u.abs() > v.abs() { (u, FRAC_PI_4 * v / u) } else { (v, FRAC_PI_2 - FRAC_PI_4 * u / v) };
+        let disk = SHOWN * radius * DVec2::from_angle(angle);
+        let normal = disk.extend((1.0 - disk.length_squared()).sqrt());
+        let tangent = DVec3::Y.cross(normal).normalize();
+        Self::new(DMat3::from_cols(tangent, normal.cross(tangent), normal), DVec3::Z, sun)
+    }
+
+    /// Spot of the floor, far ones above.
+    fn of_floor(at: DVec2, sun: DVec3) -> Self {
+        let (far, near) = FLOOR;
+        let height = (near + (far - near) * 0.5 * (at.y + 1.0)).to_radians();
+        let side = (FLOOR_SIDE * at.x).to_radians();
+        let eye = DVec3::new(-height.cos() * side.sin(), height.sin(), height.cos() * side.cos());
+        Self::new(DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y), eye, sun)
     }
 }
 
-/// Every eye in every light: suns, rooms, and rooms that a sun shines into.
-fn settings(rooms: &[Room]) -> Vec<Setting<'_>> {
-    let spherical = |angle: f64, azimuth: f64| {
-        let (sin, cos) = angle.to_radians().sin_cos();
-        let (y, x) = azimuth.to_radians().sin_cos();
-        DVec3::new(sin * x, sin * y, cos)
-    };
-    let mut settings = Vec::new();
-    for angle in EYES {
-        let wo = spherical(angle, 0.0);
-        for ((tilt, azimuth), room) in SUNS.into_iter().zip(rooms) {
-            let wh = spherical(tilt, azimuth);
-            let path = Directions::between(2.0 * wh.dot(wo) * wh - wo, wo);
-            let sun = |irradiance: f64| path.map(|path| (path, irradiance));
-            settings.push(Setting { wo, sun: sun(1.0), room: None });
-            settings.push(Setting { wo, sun: None, room: Some(room) });
-            settings.push(Setting { wo, sun: sun(SUN_IN_ROOM * room.mean), room: Some(room) });
-        }
-    }
-    settings
-}
-
-/// Errors of several sets of roughness mips on one surface, level by level from the first that is filtered;
-/// every set has the surface's levels. They are shaded with the mean normals of an engine's own mips.
-///
-/// # Errors
-/// [`Cancelled`] when the observer wants it to end.
-///
-/// # Panics
-/// When a set has fewer levels than the surface.
-pub fn judge(
-    surface: &RoughSurface,
-    material: EngineMaterial,
-    candidates: &[&[Grid<f32>]],
-    observer: &dyn Observer,
-) -> Result<Vec<LevelErrors>, Cancelled> {
-    let settings = settings(&BUILT_ROOMS);
-    let facets =
-        Brdf::new(AnyLobe::from(Ggx::new(PerceptualRoughness::SMOOTHEST.into())), ShadingModel::Smith);
-    let engine = Engine { material, lobe: SplitSum::new(&facets) };
-    let mut levels = Vec::new();
-    let last = surface.sizes().len() - 1;
-    for level in 1..=last {
-        observer.check()?;
-        let of_level: Vec<&Grid<f32>> = candidates.iter().map(|levels| &levels[level]).collect();
-        let pictures = Pictures::shade(surface, &engine, &settings, level, &of_level);
-        levels.push(LevelErrors { level, candidates: pictures.errors() });
-        observer.progress(level as f64 / last as f64);
-    }
-    Ok(levels)
-}
-
-/// Shading of an engine.
-struct Engine {
-    material: EngineMaterial,
+/// Lights, and the objects that every surface is laid on.
+struct Stage {
+    objects: Vec<Object>,
     /// Share of a white sky that a lobe reflects.
     lobe: SplitSum,
 }
 
-impl Engine {
-    fn lit(&self, n: DVec3, roughness: f64, setting: &Setting<'_>) -> f64 {
-        let sun = setting.sun.map_or(0.0, |(path, power)| power * self.material.shade(n, roughness, &path));
-        let room = setting.room.map_or(0.0, |room| room.lit(self, n, setting.wo, roughness));
-        sun + room
+/// Object in its room.
+struct Object {
+    /// Spots of the pixels, row by row.
+    spots: Vec<Spot>,
+    room: Room,
+}
+
+/// The stage, set once: many materials are judged on the same.
+static STAGE: LazyLock<Stage> = LazyLock::new(Stage::new);
+
+impl Stage {
+    fn new() -> Self {
+        let facets =
+            Brdf::new(AnyLobe::from(Ggx::new(PerceptualRoughness::SMOOTHEST.into())), ShadingModel::Smith);
+        let along = |i: usize| 2.0 * (i as f64 + 0.5) / SIDE as f64 - 1.0;
+        let object = |(spot, sun, room): (Spots, DVec3, &str)| {
+            let spots = (0..SIDE * SIDE).map(|i| spot(DVec2::new(along(i % SIDE), -along(i / SIDE)), sun));
+            Some(Object { spots: spots.collect(), room: Room::new(room)? })
+        };
+        Self { objects: OBJECTS.into_iter().filter_map(object).collect(), lobe: SplitSum::new(&facets) }
+    }
+
+    /// Light of a normal at a pixel, in every picture.
+    fn lights(&self, material: &EngineMaterial, n: DVec3, roughness: f64, pixel: usize) -> Lights {
+        let width = SlopeVariance::clamped(roughness.max(LEAST_ROUGHNESS).powi(4) / 2.0);
+        let grey = |v: DVec3| v.element_sum() / 3.0;
+        let albedo = (1.0 - material.specular) * material.diffuse / std::f64::consts::PI;
+        let mut lights = [0.0; PICTURES];
+        for (picture, Object { spots, room }) in lights.as_chunks_mut().0.iter_mut().zip(&self.objects) {
+            let Spot { frame, wo, sun } = &spots[pixel];
+            let eye = n.dot(*wo).clamp(0.0, 1.0);
+            let reflected = self.lobe.lookup(eye, width);
+            let reflected = material.specular * grey(reflected.scale) + reflected.bias;
+            let cube = room.filtered.prefiltered(Microfacets::Ggx);
+            let mirror = *frame * (2.0 * eye * n - *wo);
+            let seen = grey(cube.lookup(mirror, Microfacets::level(width, 1.0, cube.levels())));
+            let scattered = match albedo {
+                0.0 => 0.0,
+                _ => albedo * grey(room.filtered.irradiance.of_normals(*frame * n, 0.0, false)),
+            };
+            let in_room = seen * reflected + scattered;
+            let in_sun = sun.map_or(0.0, |path| material.shade(n, roughness, &path));
+            *picture = [in_sun, in_room, SUN_IN_ROOM * room.mean * in_sun + in_room];
+        }
+        lights
+    }
+}
+
+/// Judge of roughness mips on one surface: it has seen the truth of every level but the finest.
+pub struct Judge<'a> {
+    surface: &'a RoughSurface,
+    material: EngineMaterial,
+    levels: Vec<Truth>,
+}
+
+/// Part of a level that is seen, and its truth.
+struct Truth {
+    level: usize,
+    size: Size,
+    corner: (usize, usize),
+    /// Picture in each light; `None` for one that is black.
+    pictures: Vec<Option<Shown>>,
+}
+
+/// Picture, as it is and as the eye sees it.
+struct Shown {
+    picture: Picture,
+    seen: FlipTruth,
+}
+
+impl<'a> Judge<'a> {
+    /// Shades every normal of a surface as an engine does.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the observer wants it to end.
+    pub fn new(
+        surface: &'a RoughSurface,
+        material: EngineMaterial,
+        observer: &dyn Observer,
+    ) -> Result<Self, Cancelled> {
+        let sizes: Vec<Size> = surface.sizes().collect();
+        let mut levels = Vec::new();
+        for (level, whole) in sizes.iter().enumerate().skip(1) {
+            observer.check()?;
+            levels.push(Truth::new(surface, &material, (level, *whole)));
+            observer.progress(level as f64 / (sizes.len() - 1) as f64);
+        }
+        Ok(Self { surface, material, levels })
+    }
+
+    /// Errors of several sets of roughness mips, level by level from the first that is filtered; every set
+    /// has the surface's levels. They are shaded with the mean normals of an engine's own mips.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the observer wants it to end.
+    ///
+    /// # Panics
+    /// When a set has fewer levels than the surface.
+    pub fn errors(
+        &self,
+        candidates: &[&[Grid<f32>]],
+        observer: &dyn Observer,
+    ) -> Result<Vec<LevelErrors>, Cancelled> {
+        let mut all = Vec::new();
+        for (i, truth) in self.levels.iter().enumerate() {
+            observer.check()?;
+            let errors = |levels: &&[Grid<f32>]| truth.errors(&self.shaded(truth, &levels[truth.level]));
+            let candidates = candidates.iter().map(errors).collect();
+            all.push(LevelErrors { level: truth.level, candidates });
+            observer.progress((i + 1) as f64 / self.levels.len() as f64);
+        }
+        Ok(all)
+    }
+
+    /// Pixels of a level with one normal and one roughness each.
+    fn shaded(&self, truth: &Truth, roughness: &Grid<f32>) -> Vec<Lights> {
+        let stage = &*STAGE;
+        let pixel = |i: usize| {
+            let (x, y) = truth.texel(i);
+            let n = unit_or_up(self.surface.mean(truth.level, x, y).normal).as_dvec3();
+            stage.lights(&self.material, n, f64::from(roughness.row(y)[x]), i)
+        };
+        (0..SIDE * SIDE).into_par_iter().map(pixel).collect()
     }
 }
 
@@ -188,73 +278,53 @@ fn busiest(surface: &RoughSurface, level: usize, size: Size, part: Size) -> (usi
     parts.max_by(|a, b| a.0.total_cmp(&b.0)).map_or((0, 0), |(_, corner)| corner)
 }
 
-/// Pictures of a level for each setting, grey.
-struct Pictures {
-    size: Size,
-    /// By pixel, then setting, then the truth and the candidates.
-    values: Vec<Vec<Vec<f64>>>,
-}
-
-impl Pictures {
-    fn shade(
-        surface: &RoughSurface,
-        engine: &Engine,
-        settings: &[Setting<'_>],
-        level: usize,
-        candidates: &[&Grid<f32>],
-    ) -> Self {
-        let whole = candidates[0].size();
+impl Truth {
+    fn new(surface: &RoughSurface, material: &EngineMaterial, (level, whole): (usize, Size)) -> Self {
         let size = Size { width: whole.width.min(SIDE), height: whole.height.min(SIDE) };
         let corner = busiest(surface, level, whole, size);
-        // The whole level may be larger than the part of it that is seen.
-        let stride = surface.stride(whole, SAMPLES * whole.area() / size.area());
-        let pixel = |i: usize| -> Vec<Vec<f64>> {
-            let (x, y) = (corner.0 + i % size.width, corner.1 + i / size.width);
-            let mut samples = Vec::new();
-            surface.under(whole, (x, y), stride, |weight, texel| {
-                samples.push((f64::from(weight), texel.normal.as_dvec3(), f64::from(texel.roughness)));
+        // Every pixel reads its own samples, those of one texel too.
+        let stride = surface.stride(whole, SAMPLES * whole.area() / (SIDE * SIDE));
+        let mut truth = Self { level, size, corner, pictures: Vec::new() };
+        let stage = &*STAGE;
+        let pixel = |i: usize| {
+            let mut lights = [0.0; PICTURES];
+            surface.under(whole, truth.texel(i), stride, |weight, texel| {
+                let seen = stage.lights(material, texel.normal.as_dvec3(), f64::from(texel.roughness), i);
+                lights.iter_mut().zip(seen).for_each(|(sum, light)| *sum += f64::from(weight) * light);
             });
-            let n = unit_or_up(surface.mean(level, x, y).normal).as_dvec3();
-            let of_setting = |setting: &Setting<'_>| {
-                let truth = samples.iter().map(|(weight, n, r)| weight * engine.lit(*n, *r, setting)).sum();
-                let shaded = candidates.iter().map(|r| engine.lit(n, f64::from(r.row(y)[x]), setting));
-                std::iter::once(truth).chain(shaded).collect()
-            };
-            settings.iter().map(of_setting).collect()
+            lights
         };
-        Self { size, values: (0..size.area()).into_par_iter().map(pixel).collect() }
+        let pixels: Vec<Lights> = (0..SIDE * SIDE).into_par_iter().map(pixel).collect();
+        truth.pictures = (0..PICTURES).into_par_iter().map(|which| shown(&pixels, which)).collect();
+        truth
     }
 
-    /// Mean errors of each candidate.
-    fn errors(&self) -> Vec<Errors> {
-        let settings = self.values[0].len();
-        let count = self.values[0][0].len() - 1;
-        // Small levels fill the picture by repeating, as they would on a surface.
-        let picture = |setting: usize, which: usize| -> Picture {
-            Grid::from_fn(Size { width: SIDE, height: SIDE }, |x, y| {
-                let at = y % self.size.height * self.size.width + x % self.size.width;
-                Vec3::splat(self.values[at][setting][which] as f32)
-            })
-        };
-        let of_setting = |setting: usize| -> Vec<Errors> {
-            let truth = picture(setting, 0);
-            let mean = truth.texels().iter().map(|v| f64::from(v.x)).sum::<f64>() / (SIDE * SIDE) as f64;
-            if mean <= 0.0 {
-                return vec![Errors::default(); count];
-            }
-            let exposure = (MIDDLE / mean) as f32;
-            let errors = |which: usize| {
-                let shaded = picture(setting, which);
-                Errors { relative_l2: relative_l2(&shaded, &truth), flip: flip(&shaded, &truth, exposure) }
-            };
-            (1..=count).map(errors).collect()
-        };
-        let each: Vec<Vec<Errors>> = (0..settings).into_par_iter().map(of_setting).collect();
-        let mean = |pick: fn(&Errors) -> f64, which: usize| {
-            each.iter().map(|errors| pick(&errors[which])).sum::<f64>() / settings as f64
-        };
-        (0..count)
-            .map(|i| Errors { relative_l2: mean(|e| e.relative_l2, i), flip: mean(|e| e.flip, i) })
-            .collect()
+    /// Texel of a pixel. Small levels repeat, as they would on a surface.
+    fn texel(&self, pixel: usize) -> (usize, usize) {
+        let (x, y) = (pixel % SIDE % self.size.width, pixel / SIDE % self.size.height);
+        (self.corner.0 + x, self.corner.1 + y)
     }
+
+    /// Errors of pixels in each light.
+    fn errors(&self, pixels: &[Lights]) -> [Errors; PICTURES] {
+        let of_picture = |which: usize| {
+            let Some(truth) = &self.pictures[which] else { return Errors::default() };
+            let picture = picture(pixels, which);
+            Errors { relative_l2: relative_l2(&picture, &truth.picture), flip: truth.seen.mean(&picture) }
+        };
+        let each: Vec<Errors> = (0..PICTURES).into_par_iter().map(of_picture).collect();
+        std::array::from_fn(|i| each[i])
+    }
+}
+
+/// Picture of pixels in a light, grey.
+fn picture(pixels: &[Lights], which: usize) -> Picture {
+    Grid::from_fn(Size { width: SIDE, height: SIDE }, |x, y| Vec3::splat(pixels[y * SIDE + x][which] as f32))
+}
+
+fn shown(pixels: &[Lights], which: usize) -> Option<Shown> {
+    let picture = picture(pixels, which);
+    let mean = picture.texels().iter().map(|v| f64::from(v.x)).sum::<f64>() / (SIDE * SIDE) as f64;
+    let seen = (mean > 0.0).then(|| FlipTruth::new(&picture, (MIDDLE / mean) as f32))?;
+    Some(Shown { picture, seen })
 }

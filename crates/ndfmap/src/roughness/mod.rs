@@ -9,7 +9,7 @@
 //!
 //! let map = read_source("bricks_normal.png".as_ref(), &SourceOptions::default())?;
 //! let surface = RoughSurface::new(&*map.surface, &Grid::from_fn(map.surface.size(), |_, _| 0.4))?;
-//! let job = RoughnessJob { surface: &surface, material: EngineMaterial::METAL, rule: None };
+//! let job = RoughnessJob { surface: &surface, material: EngineMaterial::METAL, by: None };
 //! let mips = job.run(&Unobserved)?;
 //! println!("{} levels", mips.levels.len());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -18,26 +18,34 @@
 mod judge;
 
 use std::fmt;
+use std::str::FromStr;
 
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::observe::{Cancelled, Observer};
 use ndfmap_core::roughness::{
-    EngineMaterial, Objective, PLAIN, RoughSurface, Row, TABLE, Widening, enlarged, mips,
+    EngineMaterial, Objective, PLAIN, RoughSurface, Row, TABLE, Widening, enlarged, find, mips,
 };
 use ndfmap_core::surface::Wraps;
 use serde::{Serialize, Serializer};
 
-pub use judge::{Errors, LevelErrors, judge};
+pub use judge::{Errors, Judge, LevelErrors, PICTURES};
 
 /// Fits that are tried. A power of 1/4 serves FLIP, and 1 relative L2; where a whole one
 /// raises a haze that FLIP punishes, a part of it may still help.
-pub const FITS: [Fit; 5] = [
+pub const FITS: [Fit; 8] = [
+    Fit { objective: Objective { power: 0.125 }, share: 0.5 },
+    Fit { objective: Objective { power: 0.125 }, share: 1.0 },
     Fit { objective: Objective { power: 0.25 }, share: 0.25 },
     Fit { objective: Objective { power: 0.25 }, share: 0.5 },
+    Fit { objective: Objective { power: 0.25 }, share: 0.75 },
     Fit { objective: Objective { power: 0.25 }, share: 1.0 },
     Fit { objective: Objective { power: 0.5 }, share: 1.0 },
     Fit { objective: Objective { power: 1.0 }, share: 1.0 },
 ];
+
+/// Importance of roughness to those who compress it, beside 1 for occlusion and metal in other channels: it
+/// rules highlights, and they are smooth.
+pub const ROUGHNESS_IMPORTANCE: f32 = 16.0;
 
 /// Fit of which a share is taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,10 +63,10 @@ pub struct RoughnessJob<'a> {
     pub surface: &'a RoughSurface,
     /// Material that the mips are judged by.
     pub material: EngineMaterial,
-    /// Formula by which they are made, whatever it does. Without one, each level takes whichever of [`FITS`],
-    /// engines' formulas and plain mips is measured to be best; never one that is worse than plain mips by
-    /// either measure.
-    pub rule: Option<&'static Row>,
+    /// Fit or formula by which they are made, whatever it does. Without one, each level takes whichever of
+    /// [`FITS`], engines' formulas and plain mips is measured to be best; never one that is worse than plain
+    /// mips by either measure.
+    pub by: Option<Origin>,
 }
 
 /// Source of a level's roughness.
@@ -77,6 +85,33 @@ impl fmt::Display for Origin {
             Self::Fit(Fit { objective: Objective { power }, share }) => write!(f, "fit:{power}:{share}"),
             Self::Rule(name) => f.write_str(name),
         }
+    }
+}
+
+/// Error of a name that is neither a fit nor a formula.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no fit and no formula has this name: there are fit:POWER, fit:POWER:SHARE, {0}")]
+pub struct ParseOriginError(String);
+
+impl FromStr for Origin {
+    type Err = ParseOriginError;
+
+    /// Reads what [`Display`](fmt::Display) writes: a power above 0 and up to 4, and a share from 0 to 1.
+    fn from_str(text: &str) -> Result<Self, ParseOriginError> {
+        let fit = |text: &str| {
+            let (power, share) = text.split_once(':').unwrap_or((text, "1"));
+            let (power, share): (f32, f32) = (power.parse().ok()?, share.parse().ok()?);
+            let is_sound = power > 0.0 && power <= 4.0 && (0.0..=1.0).contains(&share);
+            is_sound.then_some(Self::Fit(Fit { objective: Objective { power }, share }))
+        };
+        let named = match text.strip_prefix("fit:") {
+            Some(numbers) => fit(numbers),
+            None => find(text).map(|row| Self::Rule(row.name)),
+        };
+        named.ok_or_else(|| {
+            let names: Vec<&str> = TABLE.iter().map(|row| row.name).collect();
+            ParseOriginError(names.join(", "))
+        })
     }
 }
 
@@ -138,13 +173,27 @@ impl RoughnessJob<'_> {
     /// # Errors
     /// [`Cancelled`] when the observer wants it to end.
     pub fn run(&self, observer: &dyn Observer) -> Result<RoughnessMips, Cancelled> {
-        let surface = self.surface;
         observer.begin("roughness");
+        let judge = Judge::new(self.surface, self.material, &observer.part(0.0, 0.4))?;
+        self.make(&judge, &observer.part(0.4, 1.0))
+    }
+
+    /// Makes the mips, measured by a judge of the same surface and material.
+    pub(crate) fn make(
+        &self,
+        judge: &Judge<'_>,
+        observer: &dyn Observer,
+    ) -> Result<RoughnessMips, Cancelled> {
+        let surface = self.surface;
         let by =
             |row: &'static Row| Ok((Origin::Rule(row.name), surface.bake(Widening::Rule(row), observer)?));
         let mut made = vec![by(&PLAIN)?];
-        match self.rule {
-            Some(row) => made.push(by(row)?),
+        match self.by {
+            Some(Origin::Rule(name)) => made.push(by(find(name).unwrap_or(&PLAIN))?),
+            Some(Origin::Fit(fit)) => {
+                let levels = surface.bake(Widening::Fit(fit.objective), &observer.part(0.0, 0.5))?;
+                made.push((Origin::Fit(fit), partly(&made[0].1, &levels, fit.share)));
+            }
             None => {
                 // Several shares of a fit need it once.
                 let mut whole: Option<(Objective, Vec<Grid<f32>>)> = None;
@@ -164,11 +213,11 @@ impl RoughnessJob<'_> {
             }
         }
         let all: Vec<&[Grid<f32>]> = made.iter().map(|(_, levels)| &levels[..]).collect();
-        let judged = judge(surface, self.material, &all, &observer.part(0.5, 1.0))?;
+        let judged = judge.errors(&all, &observer.part(0.5, 1.0))?;
         let mut levels = vec![made[0].1[0].clone()];
         let mut report = Vec::new();
         for LevelErrors { level, candidates: errors } in &judged {
-            let chosen = if self.rule.is_some() { 1 } else { best(errors) };
+            let chosen = if self.by.is_some() { 1 } else { best(errors) };
             let (by, mips) = &made[chosen];
             levels.push(mips[*level].clone());
             report.push(LevelReport {
@@ -176,13 +225,15 @@ impl RoughnessJob<'_> {
                 by: *by,
                 stock_roughness: mean_of(&made[0].1[*level]),
                 made_roughness: mean_of(&mips[*level]),
-                stock: errors[0],
-                made: errors[chosen],
+                stock: mean(&errors[0]),
+                made: mean(&errors[chosen]),
             });
         }
         let tried = |(i, (by, _)): (usize, &(Origin, Vec<Grid<f32>>))| Tried {
             by: *by,
-            of_stock: mean_ratios(judged.iter().map(|level| (level.candidates[i], level.candidates[0]))),
+            of_stock: mean_ratios(
+                judged.iter().map(|level| (mean(&level.candidates[i]), mean(&level.candidates[0]))),
+            ),
         };
         let report = RoughnessReport {
             of_stock: mean_ratios(report.iter().map(|level| (level.made, level.stock))),
@@ -222,12 +273,27 @@ fn ratios((made, stock): (Errors, Errors)) -> Errors {
     Errors { relative_l2: ratio(made.relative_l2, stock.relative_l2), flip: ratio(made.flip, stock.flip) }
 }
 
-/// Index of the candidate with the least sum of ratios to the first, none of its ratios above one.
-fn best(errors: &[Errors]) -> usize {
+/// Mean over lights.
+pub(crate) fn mean(errors: &[Errors]) -> Errors {
+    let mean = |pick: fn(&Errors) -> f64| errors.iter().map(pick).sum::<f64>() / errors.len() as f64;
+    Errors { relative_l2: mean(|e| e.relative_l2), flip: mean(|e| e.flip) }
+}
+
+/// Greatest ratio to stock that is let pass in a single light.
+const PASSING: f64 = 1.02;
+
+/// Index of the candidate with the least sum of ratios to the first: none of its means is worse, and in no
+/// light by more than what is let pass.
+fn best(errors: &[[Errors; PICTURES]]) -> usize {
     let mut best = (2.0, 0);
     for (i, candidate) in errors.iter().enumerate().skip(1) {
-        let Errors { relative_l2, flip } = ratios((*candidate, errors[0]));
-        if relative_l2 <= 1.0 && flip <= 1.0 && relative_l2 + flip < best.0 {
+        let Errors { relative_l2, flip } = ratios((mean(candidate), mean(&errors[0])));
+        let passes = |(made, stock): (&Errors, &Errors)| {
+            let Errors { relative_l2, flip } = ratios((*made, *stock));
+            relative_l2 <= PASSING && flip <= PASSING
+        };
+        let is_safe = relative_l2 <= 1.0 && flip <= 1.0 && candidate.iter().zip(&errors[0]).all(passes);
+        if is_safe && relative_l2 + flip < best.0 {
             best = (relative_l2 + flip, i);
         }
     }
@@ -235,7 +301,7 @@ fn best(errors: &[Errors]) -> usize {
 }
 
 /// Means of both ratios.
-fn mean_ratios(pairs: impl Iterator<Item = (Errors, Errors)>) -> Errors {
+pub(crate) fn mean_ratios(pairs: impl Iterator<Item = (Errors, Errors)>) -> Errors {
     let all: Vec<Errors> = pairs.map(ratios).collect();
     let mean = |pick: fn(&Errors) -> f64| all.iter().map(pick).sum::<f64>() / all.len().max(1) as f64;
     Errors { relative_l2: mean(|e| e.relative_l2), flip: mean(|e| e.flip) }

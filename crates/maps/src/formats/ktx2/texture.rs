@@ -29,6 +29,8 @@ words!(TextureEncoding { Uastc => "uastc", Rgba8 => "rgba8" });
 pub struct Texture {
     /// RGBA of each level, finest first, each half as large as the one before it.
     pub levels: Vec<Grid<[u8; 4]>>,
+    /// Importance of red, green and blue to those who compress: weights of their squared errors.
+    pub importance: [f32; 3],
 }
 
 /// Descriptor of UASTC with three channels (Khronos Data Format Specification 1.3, section 5.6.16): version
@@ -79,10 +81,10 @@ const UASTC_DESCRIPTOR: [u8; 40] = [
 
 impl Texture {
     /// Stored bytes of a level, before they are compressed.
-    fn encoded(level: &Grid<[u8; 4]>, encoding: TextureEncoding) -> Vec<u8> {
+    fn encoded(&self, level: &Grid<[u8; 4]>, encoding: TextureEncoding) -> Vec<u8> {
         match encoding {
             TextureEncoding::Rgba8 => level.texels().as_flattened().to_vec(),
-            TextureEncoding::Uastc => uastc::pack(level),
+            TextureEncoding::Uastc => uastc::pack(level, self.importance),
         }
     }
 
@@ -112,7 +114,7 @@ impl Texture {
             let reason = "has an alpha channel, which is not written as UASTC; write it as rgba8";
             return Err(MapError::unsupported(path, reason));
         }
-        let levels: Vec<Vec<u8>> = self.levels.iter().map(|level| Self::encoded(level, encoding)).collect();
+        let levels: Vec<Vec<u8>> = self.levels.iter().map(|level| self.encoded(level, encoding)).collect();
         let content = self.content(path, encoding, &levels)?;
         // At every number of threads the same bytes: a level is one frame, cut by size alone.
         let stored = match zstd {
@@ -151,6 +153,34 @@ impl Texture {
         encoded.map_err(|e| MapError::invalid(path, format!("cannot be encoded: {e}")))
     }
 
+    /// Texels of every level as a graphics card reads them, after UASTC became its own blocks; the path is
+    /// for messages.
+    ///
+    /// # Errors
+    /// [`MapError`] when a level cannot be packed.
+    #[cfg(feature = "basis")]
+    pub fn transcoded(&self, path: &Path, blocks: Blocks) -> Result<Vec<Grid<[u8; 4]>>, MapError> {
+        use basisu::{DecodeFlags, TargetFormat, Transcoder};
+        let failed = |e: basisu::Error| MapError::invalid(path, format!("cannot be transcoded: {e:?}"));
+        let bytes = self.to_ktx2(path, TextureEncoding::Uastc, None)?;
+        let transcoder = Transcoder::new(&bytes).map_err(failed)?;
+        let target = match blocks {
+            // Its decoder is exact, and UASTC a part of it.
+            Blocks::Astc => TargetFormat::Rgba32,
+            Blocks::Bc7 => TargetFormat::Bc7Rgba,
+        };
+        let level = |(i, level): (usize, &Grid<[u8; 4]>)| {
+            let decoded = transcoder.transcode(i as u32, target, DecodeFlags::NONE).map_err(failed)?;
+            let texels = match blocks {
+                Blocks::Astc => decoded.as_chunks().0.to_vec(),
+                Blocks::Bc7 => of_bc7(&decoded, level.size()),
+            };
+            Grid::from_vec(level.size(), texels)
+                .ok_or_else(|| MapError::invalid(path, "was transcoded to another size"))
+        };
+        self.levels.iter().enumerate().map(level).collect()
+    }
+
     fn content(
         &self,
         path: &Path,
@@ -179,10 +209,36 @@ impl Texture {
     }
 }
 
+/// Blocks that a graphics card reads, and UASTC becomes.
+#[cfg(feature = "basis")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Blocks {
+    /// ASTC 4 × 4, on phones: as exact as UASTC.
+    Astc,
+    /// BC7, on desktops.
+    Bc7,
+}
+
+/// Texels of BC7 blocks.
+#[cfg(feature = "basis")]
+fn of_bc7(blocks: &[u8], size: ndfmap_core::grid::Size) -> Vec<[u8; 4]> {
+    let mut texels = vec![[0; 4]; size.area()];
+    let across = size.width.div_ceil(4);
+    for (i, block) in blocks.chunks(16).enumerate() {
+        let mut decoded = [0; 64];
+        bcdec_rs::bc7(block, &mut decoded, 16);
+        for (k, texel) in decoded.as_chunks().0.iter().enumerate() {
+            let (x, y) = (i % across * 4 + k % 4, i / across * 4 + k / 4);
+            if x < size.width && y < size.height {
+                texels[y * size.width + x] = *texel;
+            }
+        }
+    }
+    texels
+}
+
 #[cfg(all(test, feature = "basis"))]
 mod tests {
-    use basisu::{DecodeFlags, TargetFormat, Transcoder};
-
     use ndfmap_core::grid::Size;
 
     use super::*;
@@ -200,48 +256,26 @@ mod tests {
 
     fn texture(noise: u32) -> Texture {
         let sizes = ndfmap_core::pyramid::level_sizes(Size { width: 37, height: 22 });
-        Texture { levels: sizes.into_iter().map(|size| level(size, noise)).collect() }
-    }
-
-    /// Texels of BC7 blocks, as a desktop's graphics card decodes them.
-    fn of_bc7(blocks: &[u8], size: Size) -> Vec<u8> {
-        let mut texels = vec![0; 4 * size.area()];
-        let across = size.width.div_ceil(4);
-        for (i, block) in blocks.chunks(16).enumerate() {
-            let mut decoded = [0; 64];
-            bcdec_rs::bc7(block, &mut decoded, 16);
-            for (k, texel) in decoded.chunks(4).enumerate() {
-                let (x, y) = (i % across * 4 + k % 4, i / across * 4 + k / 4);
-                if x < size.width && y < size.height {
-                    texels[4 * (y * size.width + x)..][..4].copy_from_slice(texel);
-                }
-            }
-        }
-        texels
+        Texture { levels: sizes.into_iter().map(|size| level(size, noise)).collect(), importance: [1.0; 3] }
     }
 
     #[test]
     fn an_independent_transcoder_reads_every_level() {
         // Means and largest errors of a byte, measured: 0.23 and 3, 1.44 and 12 as they are; 0.51 and 9, 1.57
         // and 14 as BC7.
-        for (noise, target, mean, most) in [
-            (0, TargetFormat::Rgba32, 0.3, 4),
-            (40, TargetFormat::Rgba32, 1.6, 14),
-            (0, TargetFormat::Bc7Rgba, 0.6, 10),
-            (40, TargetFormat::Bc7Rgba, 1.7, 16),
+        for (noise, blocks, mean, most) in [
+            (0, Blocks::Astc, 0.3, 4),
+            (40, Blocks::Astc, 1.6, 14),
+            (0, Blocks::Bc7, 0.6, 10),
+            (40, Blocks::Bc7, 1.7, 16),
         ] {
             let texture = texture(noise);
-            let bytes = texture.to_ktx2("t.ktx2".as_ref(), TextureEncoding::Uastc, None).unwrap();
-            let transcoder = Transcoder::new(&bytes).unwrap();
+            let transcoded = texture.transcoded("t.ktx2".as_ref(), blocks).unwrap();
             let (mut sum, mut count, mut largest) = (0.0, 0.0, 0);
-            for (i, level) in texture.levels.iter().enumerate() {
-                let decoded = transcoder.transcode(i as u32, target, DecodeFlags::NONE).unwrap();
-                let is_bc7 = target == TargetFormat::Bc7Rgba;
-                let decoded = if is_bc7 { of_bc7(&decoded, level.size()) } else { decoded };
-                assert_eq!(decoded.len(), 4 * level.texels().len(), "level {i}");
-                for (got, due) in decoded.chunks(4).zip(level.texels()) {
+            for (decoded, level) in transcoded.iter().zip(&texture.levels) {
+                for (got, due) in decoded.texels().iter().zip(level.texels()) {
                     // Ends of BC7 share their lowest bits.
-                    assert!(got[3] == 255 || is_bc7 && got[3] == 254);
+                    assert!(got[3] == 255 || blocks == Blocks::Bc7 && got[3] == 254);
                     for (got, due) in got.iter().zip(due).take(3) {
                         let off = (i32::from(*got) - i32::from(*due)).abs();
                         sum += f64::from(off);
@@ -250,7 +284,7 @@ mod tests {
                     }
                 }
             }
-            println!("noise {noise}, {target:?}: mean {:.2}, largest {largest}", sum / count);
+            println!("noise {noise}, {blocks:?}: mean {:.2}, largest {largest}", sum / count);
             assert!(sum / count < mean && largest <= most, "{noise}: {} {largest}", sum / count);
         }
     }
@@ -258,7 +292,7 @@ mod tests {
     #[test]
     fn one_colour_is_exact_and_plain_bytes_are_as_they_were() {
         let flat = Grid::from_fn(Size { width: 8, height: 8 }, |_, _| [3, 130, 77, 255]);
-        let texture = Texture { levels: vec![flat.clone()] };
+        let texture = Texture { levels: vec![flat.clone()], importance: [1.0; 3] };
         for encoding in [TextureEncoding::Uastc, TextureEncoding::Rgba8] {
             let bytes = texture.to_ktx2("t.ktx2".as_ref(), encoding, Some(3)).unwrap();
             let image = crate::formats::read_image("t.ktx2".as_ref(), &bytes).unwrap();
