@@ -4,6 +4,8 @@
 //! or a height map, in any of the formats of [`formats::TABLE`]. A **normal distribution map**
 //! ([`NdfMap`]) is the product of a bake: a stored pyramid and a [`Header`] that describes it.
 
+#[cfg(feature = "gltf")]
+pub mod asset;
 pub mod atomic;
 pub mod attribute;
 pub mod environment;

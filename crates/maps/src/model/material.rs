@@ -155,7 +155,7 @@ pub(super) fn only_normal(surface: &dyn Surface) -> Option<Vec3> {
 ///
 /// # Errors
 /// [`MapError`] when it holds values that are not finite.
-pub(super) fn colours(path: &Path, image: &Image, transfer: Transfer) -> Result<Grid<[f32; 4]>, MapError> {
+pub(crate) fn colours(path: &Path, image: &Image, transfer: Transfer) -> Result<Grid<[f32; 4]>, MapError> {
     let values = attribute_of_image(path, image, transfer)?.values;
     if image.channels == 1 {
         let grey = |x: usize, y: usize| values.row(y)[x][0];

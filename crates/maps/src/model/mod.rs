@@ -37,6 +37,11 @@ use ndfmap_scene::{Camera, Material, Mesh, Object, Scene, SceneOptions, Vertex, 
 use crate::MapError;
 use crate::formats::read_file;
 
+#[cfg(feature = "gltf")]
+pub(crate) use self::gltf::{OLD as OLD_GLTF, Resource, Scaled, resource, resource_path};
+#[cfg(feature = "gltf")]
+pub(crate) use self::material::colours;
+
 /// Reads the parts of a model from a whole file; warnings go into the list.
 type ReadModel = fn(&Path, &[u8], &mut Vec<String>) -> Result<Parts, MapError>;
 

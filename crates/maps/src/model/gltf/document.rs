@@ -76,7 +76,7 @@ pub(super) fn open<'a>(path: &'a Path, bytes: &'a [u8]) -> Result<Opened<'a>, Ma
 }
 
 /// Refusal of the version before the present one.
-const OLD: &str = "is glTF 1.0, which is not read: export glTF 2.0";
+pub(crate) const OLD: &str = "is glTF 1.0, which is not read: export glTF 2.0";
 
 /// Refuses what is not read, by its name, before a parser stumbles over what comes of it.
 fn refuse_unread(path: &Path, json: &Value) -> Result<(), MapError> {
@@ -120,16 +120,16 @@ fn rewrite(json: &mut Value) {
 }
 
 /// Bytes behind a URI, and a path to name them by.
-pub(super) struct Resource {
-    pub(super) path: PathBuf,
-    pub(super) bytes: Vec<u8>,
+pub(crate) struct Resource {
+    pub(crate) path: PathBuf,
+    pub(crate) bytes: Vec<u8>,
 }
 
 /// Bytes behind a URI.
 ///
 /// # Errors
 /// [`MapError`] for one that is no base64 data, or no file beside the document that can be read.
-pub(super) fn resource(path: &Path, uri: &str) -> Result<Resource, MapError> {
+pub(crate) fn resource(path: &Path, uri: &str) -> Result<Resource, MapError> {
     if let Some(data) = uri.strip_prefix("data:") {
         let coded = data.split_once(";base64,").map(|(_, coded)| coded);
         let coded = coded.ok_or_else(|| MapError::unsupported(path, "has a data URI that is not base64"))?;
@@ -138,6 +138,16 @@ pub(super) fn resource(path: &Path, uri: &str) -> Result<Resource, MapError> {
             .map_err(|e| MapError::invalid(path, format!("has a damaged data URI: {e}")))?;
         return Ok(Resource { path: path.to_owned(), bytes });
     }
+    let file = resource_path(path, uri)?;
+    let bytes = read_file(&file)?;
+    Ok(Resource { path: file, bytes })
+}
+
+/// File behind a URI that is no data.
+///
+/// # Errors
+/// [`MapError`] for one that is no file beside the document.
+pub(crate) fn resource_path(path: &Path, uri: &str) -> Result<PathBuf, MapError> {
     let name = percent_decoded(uri);
     let relative = !name.contains(':') && !Path::new(&name).has_root();
     if !relative {
@@ -148,8 +158,7 @@ pub(super) fn resource(path: &Path, uri: &str) -> Result<Resource, MapError> {
     if file.exists() && !file.is_file() {
         return Err(MapError::invalid(&file, "is no file"));
     }
-    let bytes = read_file(&file)?;
-    Ok(Resource { path: file, bytes })
+    Ok(file)
 }
 
 /// A URI's `%20` and its kind as the characters they stand for.

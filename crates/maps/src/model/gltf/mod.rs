@@ -12,6 +12,9 @@ mod document;
 mod meshopt;
 mod textures;
 
+pub(crate) use self::document::{OLD, Resource, resource, resource_path};
+pub(crate) use self::textures::Scaled;
+
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 

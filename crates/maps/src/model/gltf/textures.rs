@@ -19,9 +19,16 @@ use crate::source::{Convention, SourceOptions, source_of_image};
 use crate::{Image, MapError, SourceKind};
 
 /// A normal map with its x and y scaled, as `normalTexture.scale` asks.
-struct Scaled {
+pub(crate) struct Scaled {
     inner: Arc<dyn Surface>,
     scale: f32,
+}
+
+impl Scaled {
+    /// A normal map with x and y times a scale.
+    pub(crate) fn of(inner: Arc<dyn Surface>, scale: f32) -> Arc<dyn Surface> {
+        if scale == 1.0 { inner } else { Arc::new(Self { inner, scale }) }
+    }
 }
 
 impl Surface for Scaled {
@@ -96,11 +103,7 @@ impl Opened<'_> {
         let name = material.name().unwrap_or("unnamed");
         warnings.extend(map.warnings.iter().map(|w| format!("normal map of `{name}` {w}")));
         let surface = mirrors(&normal.texture()).surface(map.surface);
-        let surface: Arc<dyn Surface> = match normal.scale() {
-            1.0 => surface,
-            scale => Arc::new(Scaled { inner: surface, scale }),
-        };
-        Ok(Some(Texture { content: surface, laying }))
+        Ok(Some(Texture { content: Scaled::of(surface, normal.scale()), laying }))
     }
 
     /// A material whose base colour is multiplied by `tint`, linear, and the laying of its map.
