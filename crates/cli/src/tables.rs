@@ -1,6 +1,7 @@
 //! Tables for a terminal: the library's reports as text.
 
 use ndfmap::BakeReport;
+use ndfmap::asset::{AssetReport, Gain, LayerReport, Outcome, Written};
 use ndfmap::choose::Choice;
 use ndfmap::compare::{Comparison, three_digits};
 use ndfmap::core::measure::{Estimate, FilteringError, SURE, UNSEEN};
@@ -37,6 +38,36 @@ pub(crate) fn made(all: &[Made]) -> String {
     }
     let Verdict { judged, met } = Verdict::of(&claims().cloned().collect::<Vec<_>>());
     text + &format!("{} figures; of {judged} statements that can be judged, {met} come out\n", all.len())
+}
+
+/// Table of a glTF model: a row a layer of a material, and what was done with it.
+pub(crate) fn gltf(report: &AssetReport, written: Option<&Written>) -> String {
+    let longest = report.layers.iter().map(|l| l.name.chars().count()).max().unwrap_or(0).max(8);
+    let mut text = format!(
+        "errors of roughness mips over those of stock ones, after compression, as an engine shades them\n\n\
+         {:longest$}  layer             size  relative L2  FLIP  outcome\n",
+        "material"
+    );
+    for LayerReport { name, layer, outcome, .. } in &report.layers {
+        let row = |gain: &Gain, outcome: &str| {
+            let Gain { width, height, compressed_of_stock: Errors { relative_l2, flip }, .. } = gain;
+            let size = format!("{width} × {height}");
+            format!("{size:>12}  {relative_l2:>11.2}  {flip:.2}  {outcome}")
+        };
+        let row = match outcome {
+            Outcome::Fixed(gain) => row(gain, "fixed"),
+            Outcome::NoBetter(gain) => row(gain, "left alone: the gain is too small"),
+            Outcome::LeftAlone(reason) => {
+                format!("{:>12}  {:>11}  {:>4}  left alone: {reason}", "-", "-", "-")
+            }
+        };
+        text += &format!("{name:longest$}  {layer:9}  {row}\n");
+    }
+    text += &format!("\n{} of {} layers fixed", report.fixed(), report.layers.len());
+    if let Some(Written { files, bytes }) = written {
+        text += &format!("; {bytes} bytes in {} files", files.len());
+    }
+    text + "\n"
 }
 
 /// Tables of roughness mips: a row a level, stock beside what was made; and a row for all that was tried.

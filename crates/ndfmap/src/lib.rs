@@ -29,6 +29,8 @@ pub use ndfmap_maps as maps;
 pub use ndfmap_scene as scene;
 pub use ndfmap_trace as trace;
 
+#[cfg(all(feature = "models", feature = "basis"))]
+pub mod asset;
 mod bake;
 pub mod choose;
 pub mod compare;

@@ -9,6 +9,7 @@ mod bake;
 mod compare;
 mod demo;
 mod figure;
+mod gltf;
 mod inspect;
 mod render;
 mod roughness;
@@ -67,6 +68,7 @@ enum Command {
     Compare(compare::Compare),
     Render(Box<render::Render>),
     Figure(figure::FigureCommand),
+    Gltf(gltf::Gltf),
     Roughness(Box<roughness::Roughness>),
     #[cfg(feature = "gpu")]
     Shader(shader::Shader),
@@ -95,6 +97,7 @@ impl Program {
             Command::Compare(command) => command.run(json),
             Command::Render(command) => command.run(json),
             Command::Figure(command) => command.run(json),
+            Command::Gltf(command) => command.run(json),
             Command::Roughness(command) => command.run(json),
             #[cfg(feature = "gpu")]
             Command::Shader(command) => command.run(json),

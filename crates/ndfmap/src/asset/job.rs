@@ -1,0 +1,257 @@
+//! The work on an asset: pairs that are alike are baked once, judged as they are compressed, and kept or not.
+
+use std::path::Path;
+
+use ndfmap_core::grid::{Grid, Size};
+use ndfmap_core::observe::Observer;
+use ndfmap_core::roughness::{EngineMaterial, PLAIN, RoughSurface, Widening};
+use ndfmap_core::surface::{Surface, unit_or_up};
+use ndfmap_maps::MapError;
+use ndfmap_maps::asset::{Appearance, Asset, Layer, MaterialPair, Pair};
+use ndfmap_maps::formats::ktx2::{Blocks, Texture};
+
+use super::{
+    AssetFix, AssetJob, AssetReport, Gain, LEAST_GAIN, LayerReport, NewTexture, Outcome, fits_blocks,
+};
+use crate::Error;
+use crate::roughness::{Errors, Judge, ROUGHNESS_IMPORTANCE, RoughnessJob, channel_mips, mean, mean_ratios};
+
+/// Layers that share all that their roughness mips depend on.
+struct Group {
+    layers: Vec<MaterialPair>,
+    name: String,
+    /// Places of their accounts.
+    reports: Vec<usize>,
+}
+
+impl AssetJob<'_> {
+    /// Bakes and measures every pair of the asset.
+    ///
+    /// # Errors
+    /// [`Error`] when a map cannot be read, and when the observer cancels.
+    pub fn run(&self, observer: &dyn Observer) -> Result<AssetFix, Error> {
+        let mut groups: Vec<Group> = Vec::new();
+        let mut outcomes = Vec::new();
+        let layers = self.asset.layers();
+        for (i, found) in layers.iter().enumerate() {
+            let pair = match &found.pair {
+                Ok(pair) => pair,
+                Err(reason) => {
+                    outcomes.push(Some(Outcome::LeftAlone(reason.clone())));
+                    continue;
+                }
+            };
+            outcomes.push(None);
+            let layer = MaterialPair { material: found.material, pair: pair.clone() };
+            match groups.iter_mut().find(|group| are_alike(&group.layers[0].pair, pair)) {
+                Some(group) => {
+                    group.layers.push(layer);
+                    group.reports.push(i);
+                }
+                None => {
+                    let name = match found.layer {
+                        Layer::Base => found.name.clone(),
+                        Layer::Clearcoat => format!("{} clearcoat", found.name),
+                    };
+                    groups.push(Group { layers: vec![layer], name, reports: vec![i] });
+                }
+            }
+        }
+        let mut textures: Vec<NewTexture> = Vec::new();
+        let mut warnings = Vec::new();
+        for group in groups {
+            observer.begin(&format!("roughness of `{}`", group.name));
+            let (outcome, texture) = self.group(&group, &mut warnings, observer)?;
+            for i in group.reports {
+                outcomes[i] = Some(outcome.clone());
+            }
+            textures.extend(texture);
+        }
+        let report = |(found, outcome): (_, Option<Outcome>)| {
+            let ndfmap_maps::asset::MaterialLayer { material, name, layer, .. } = found;
+            Some(LayerReport { material, name, layer, outcome: outcome? })
+        };
+        let layers = layers.into_iter().zip(outcomes).filter_map(report).collect();
+        Ok(AssetFix { report: AssetReport { layers, warnings }, textures })
+    }
+
+    fn group(
+        &self,
+        group: &Group,
+        warnings: &mut Vec<String>,
+        observer: &dyn Observer,
+    ) -> Result<(Outcome, Option<NewTexture>), Error> {
+        let (asset, MaterialPair { material, pair }) = (self.asset, &group.layers[0]);
+        let (normals, told) = asset.normals(pair)?;
+        warnings.extend(told.iter().map(|w| format!("normal map of `{}` {w}", group.name)));
+        let values = asset.roughness(pair)?;
+        let surface = surface(asset.path(), &*normals, values.as_ref(), pair.factor)?;
+        let size = surface.size();
+        if !fits_blocks(size) {
+            let reason = ndfmap_maps::asset::Reason::OddSize(size);
+            return Ok((Outcome::LeftAlone(reason), None));
+        }
+        let judged_as = engine_material(asset, *material, pair.layer)?;
+        let job = RoughnessJob { surface: &surface, material: judged_as, by: self.by };
+        let judge = Judge::new(&surface, judged_as, &observer.part(0.0, 0.35))?;
+        let mips = job.make(&judge, &observer.part(0.35, 0.85))?;
+        let holds_occlusion = group.layers.iter().any(|layer| layer.pair.holds_occlusion);
+        let channels = Channels { old: values.as_ref(), holds_occlusion };
+        let texture = channels.texture(&mips.levels);
+        let compressed = self.compressed(&surface, &judge, &texture, &observer.part(0.85, 1.0))?;
+        let gain = Gain {
+            width: size.width,
+            height: size.height,
+            levels: mips.report.levels.clone(),
+            of_stock: mips.report.of_stock,
+            compressed_of_stock: compressed,
+        };
+        let is_better = compressed.relative_l2 <= 1.0
+            && compressed.flip <= 1.0
+            && 1.0 - (compressed.relative_l2 + compressed.flip) / 2.0 >= LEAST_GAIN;
+        let is_fixed = self.by.is_some() || is_better;
+        let roughness = if is_fixed {
+            texture
+        } else {
+            channels.texture(&surface.bake(Widening::Rule(&PLAIN), observer)?)
+        };
+        let fallback = fallback(&values, pair.factor, asset.has_core_picture(pair));
+        let new = NewTexture {
+            layers: group.layers.clone(),
+            name: group.name.clone(),
+            roughness,
+            fallback,
+            is_fixed,
+        };
+        Ok((if is_fixed { Outcome::Fixed(gain) } else { Outcome::NoBetter(gain) }, Some(new)))
+    }
+
+    /// Errors over those of stock mips once the texture is compressed: the worse of both kinds of blocks.
+    fn compressed(
+        &self,
+        surface: &RoughSurface,
+        judge: &Judge<'_>,
+        texture: &Texture,
+        observer: &dyn Observer,
+    ) -> Result<Errors, Error> {
+        if texture.levels.len() < 2 {
+            return Ok(Errors { relative_l2: 1.0, flip: 1.0 });
+        }
+        let stock = surface.bake(Widening::Rule(&PLAIN), observer)?;
+        let filtered = Texture { levels: texture.levels[1..].to_vec(), importance: texture.importance };
+        let roughness = |blocks: Blocks| -> Result<Vec<Grid<f32>>, Error> {
+            let levels = filtered.transcoded(self.asset.path(), blocks)?;
+            let green = |level: &Grid<[u8; 4]>| {
+                Grid::from_fn(level.size(), |x, y| f32::from(level.row(y)[x][1]) / 255.0)
+            };
+            Ok(std::iter::once(stock[0].clone()).chain(levels.iter().map(green)).collect())
+        };
+        let (astc, bc7) = (roughness(Blocks::Astc)?, roughness(Blocks::Bc7)?);
+        let judged = judge.errors(&[&stock, &astc, &bc7], observer)?;
+        let of_stock = |i: usize| {
+            mean_ratios(judged.iter().map(|level| (mean(&level.candidates[i]), mean(&level.candidates[0]))))
+        };
+        let (astc, bc7) = (of_stock(1), of_stock(2));
+        Ok(Errors { relative_l2: astc.relative_l2.max(bc7.relative_l2), flip: astc.flip.max(bc7.flip) })
+    }
+}
+
+/// True for pairs whose roughness mips are the same.
+fn are_alike(a: &Pair, b: &Pair) -> bool {
+    // A coat has no occlusion and no metal, but its channels are kept all the same.
+    Pair { layer: a.layer, holds_occlusion: a.holds_occlusion, ..b.clone() } == *a
+}
+
+/// Normals and roughness of a pair.
+fn surface(
+    path: &Path,
+    normals: &dyn Surface,
+    values: Option<&Grid<[f32; 4]>>,
+    factor: f32,
+) -> Result<RoughSurface, MapError> {
+    let roughness = match values {
+        Some(values) => Grid::from_fn(values.size(), |x, y| values.row(y)[x][1] * factor),
+        None => Grid::from_fn(normals.size(), |_, _| factor),
+    };
+    RoughSurface::new(normals, &roughness).map_err(|e| MapError::invalid(path, e))
+}
+
+/// Material of a layer as it is judged: grey, and the same all over.
+fn engine_material(asset: &Asset, material: usize, layer: Layer) -> Result<EngineMaterial, MapError> {
+    /// Reflectance of an index of refraction of 1.5, glTF's dielectric and its clearcoat.
+    const DIELECTRIC: f64 = 0.04;
+    Ok(match layer {
+        Layer::Clearcoat => EngineMaterial { specular: DIELECTRIC, diffuse: 0.0 },
+        Layer::Base => {
+            let Appearance { base, metallic } = asset.appearance(material)?;
+            let (base, metallic) = (f64::from(base), f64::from(metallic));
+            EngineMaterial {
+                specular: DIELECTRIC * (1.0 - metallic) + base * metallic,
+                diffuse: base * (1.0 - metallic),
+            }
+        }
+    })
+}
+
+fn byte(v: f32) -> u8 {
+    (v.clamp(0.0, 1.0) * 255.0).round() as u8
+}
+
+/// Channels of a roughness texture.
+struct Channels<'a> {
+    /// Old texture, whose red and blue are kept as plain mips; white where there is none.
+    old: Option<&'a Grid<[f32; 4]>>,
+    /// True where red is the occlusion.
+    holds_occlusion: bool,
+}
+
+impl Channels<'_> {
+    /// Texture with these levels of roughness in green.
+    fn texture(&self, roughness: &[Grid<f32>]) -> Texture {
+        let others = self.old.map(|old| channel_mips(old.clone(), roughness[0].size()));
+        let level = |(l, roughness): (usize, &Grid<f32>)| {
+            Grid::from_fn(roughness.size(), |x, y| {
+                let [r, b] = match &others {
+                    Some(others) => [0, 2].map(|c: usize| byte(others[l].row(y)[x][c])),
+                    None => [u8::MAX; 2],
+                };
+                [r, byte(roughness.row(y)[x]), b, u8::MAX]
+            })
+        };
+        // A red channel that nobody reads costs the others nothing.
+        let red = if self.holds_occlusion { 1.0 } else { 0.0 };
+        Texture {
+            levels: roughness.iter().enumerate().map(level).collect(),
+            importance: [red, ROUGHNESS_IMPORTANCE, 1.0],
+        }
+    }
+}
+
+/// Finest level for engines without KTX2, where the old picture is none for them or lacks the factor.
+fn fallback(values: &Option<Grid<[f32; 4]>>, factor: f32, has_core_picture: bool) -> Option<Grid<[u8; 4]>> {
+    match values {
+        None => {
+            let texel = [u8::MAX, byte(factor), u8::MAX, u8::MAX];
+            Some(Grid::from_fn(Size { width: 1, height: 1 }, |_, _| texel))
+        }
+        Some(_) if factor == 1.0 && has_core_picture => None,
+        Some(values) => Some(Grid::from_fn(values.size(), |x, y| {
+            let [r, g, b, _] = values.row(y)[x];
+            [byte(r), byte(g * factor), byte(b), u8::MAX]
+        })),
+    }
+}
+
+/// Normals of a pair before their scale, with the mips that an engine would make, of unit length.
+pub(super) fn normal_texture(asset: &Asset, pair: &Pair) -> Result<Texture, Error> {
+    let (normals, _) = asset.normals(&Pair { scale: 1.0, ..pair.clone() })?;
+    let smooth = Grid::from_fn(Size { width: 1, height: 1 }, |_, _| 0.0);
+    let surface = RoughSurface::new(&*normals, &smooth).map_err(|e| Error::Failed(e.to_string()))?;
+    let level = |(l, size): (usize, Size)| {
+        Grid::from_fn(size, |x, y| {
+            let n = unit_or_up(surface.mean(l, x, y).normal);
+            [byte(0.5 * n.x + 0.5), byte(0.5 * n.y + 0.5), byte(0.5 * n.z + 0.5), u8::MAX]
+        })
+    };
+    Ok(Texture { levels: surface.sizes().enumerate().map(level).collect(), importance: [1.0; 3] })
+}

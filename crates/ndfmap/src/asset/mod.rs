@@ -1,0 +1,251 @@
+//! glTF assets that keep their look with distance: roughness mips in the place of roughness textures, where
+//! they are measured to be better, as they will be compressed.
+//!
+//! ```no_run
+//! use ndfmap::asset::AssetJob;
+//! use ndfmap::core::observe::Unobserved;
+//! use ndfmap::maps::asset::{Asset, Form};
+//!
+//! let asset = Asset::read("helmet.glb".as_ref())?;
+//! let fix = AssetJob { asset: &asset, by: None }.run(&Unobserved)?;
+//! for layer in &fix.report.layers {
+//!     println!("{}: {}", layer.name, layer.outcome);
+//! }
+//! fix.save(&asset, Form::Web, Some(3), "helmet-fixed.glb".as_ref())?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod job;
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use ndfmap_core::grid::{Grid, Size};
+use ndfmap_maps::asset::{Asset, AssetFile, Form, Layer, MaterialPair, Reason, Replacement, Slot};
+use ndfmap_maps::atomic::AtomicFile;
+use ndfmap_maps::formats::ktx2::{Texture, TextureEncoding};
+use ndfmap_maps::{MapError, formats::png};
+use serde::{Serialize, Serializer};
+
+use crate::Error;
+use crate::roughness::{Errors, LevelReport, Origin};
+
+/// Change of a glTF asset to be made.
+#[derive(Clone, Copy, Debug)]
+pub struct AssetJob<'a> {
+    /// Asset to be changed.
+    pub asset: &'a Asset,
+    /// Fit or formula for every material, whatever it does, in place of what is measured to be best.
+    pub by: Option<Origin>,
+}
+
+/// Least gain, as a part of the sum of both errors, for which a texture is exchanged: what is smaller is not
+/// worth its bytes.
+pub const LEAST_GAIN: f64 = 0.02;
+
+/// Changed asset, ready to be written.
+#[derive(Clone, Debug)]
+pub struct AssetFix {
+    /// Account of it.
+    pub report: AssetReport,
+    /// New textures.
+    textures: Vec<NewTexture>,
+}
+
+/// New textures of layers that share them.
+#[derive(Clone, Debug)]
+struct NewTexture {
+    layers: Vec<MaterialPair>,
+    name: String,
+    roughness: Texture,
+    /// Finest level, for engines without KTX2, where the old picture says something else.
+    fallback: Option<Grid<[u8; 4]>>,
+    /// False for plain mips, which only an engine needs that makes none.
+    is_fixed: bool,
+}
+
+/// Account of a changed asset.
+#[derive(Clone, Debug, Serialize)]
+pub struct AssetReport {
+    /// Every layer of every material.
+    pub layers: Vec<LayerReport>,
+    /// Warnings about its maps.
+    pub warnings: Vec<String>,
+}
+
+/// Account of a layer of a material.
+#[derive(Clone, Debug, Serialize)]
+pub struct LayerReport {
+    /// Index of the material.
+    pub material: usize,
+    /// Name of the material, or its index where it has none.
+    pub name: String,
+    /// Layer of it.
+    pub layer: Layer,
+    /// Measurement and change of it.
+    pub outcome: Outcome,
+}
+
+/// Outcome for a layer.
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// Its roughness texture is exchanged.
+    Fixed(Gain),
+    /// Nothing that was tried is better than what it has, or by too little.
+    NoBetter(Gain),
+    /// Its maps are such that it cannot be judged.
+    LeftAlone(#[serde(serialize_with = "spelled")] Reason),
+}
+
+fn spelled<S: Serializer>(reason: &Reason, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(reason)
+}
+
+/// Gain of a layer, measured.
+#[derive(Clone, Debug, Serialize)]
+pub struct Gain {
+    /// Width of the textures, in texels.
+    pub width: usize,
+    /// Height of the textures, in texels.
+    pub height: usize,
+    /// Every level but the finest, before compression.
+    pub levels: Vec<LevelReport>,
+    /// Errors over those of stock mips, before compression.
+    pub of_stock: Errors,
+    /// The same after compression: the worse of ASTC and BC7, measure by measure.
+    pub compressed_of_stock: Errors,
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let gain = |f: &mut fmt::Formatter<'_>, gain: &Gain| {
+            let Errors { relative_l2, flip } = gain.compressed_of_stock;
+            write!(f, "relative L2 {relative_l2:.2}, FLIP {flip:.2} of stock")
+        };
+        match self {
+            Self::Fixed(of) => {
+                f.write_str("fixed: ")?;
+                gain(f, of)
+            }
+            Self::NoBetter(of) => {
+                f.write_str("left alone: at best ")?;
+                gain(f, of)
+            }
+            Self::LeftAlone(reason) => write!(f, "left alone: {reason}"),
+        }
+    }
+}
+
+impl AssetReport {
+    /// Number of layers whose texture is exchanged.
+    #[must_use]
+    pub fn fixed(&self) -> usize {
+        self.layers.iter().filter(|layer| matches!(layer.outcome, Outcome::Fixed(_))).count()
+    }
+}
+
+/// Files that were written.
+#[derive(Clone, Debug, Serialize)]
+pub struct Written {
+    /// Names of the files, the document last.
+    pub files: Vec<PathBuf>,
+    /// Bytes of all of them.
+    pub bytes: u64,
+}
+
+impl AssetFix {
+    /// Writes the changed asset, whole or not at all.
+    ///
+    /// # Errors
+    /// [`Error`] when a texture cannot be packed, or a file cannot be read or written.
+    pub fn save(&self, asset: &Asset, form: Form, zstd: Option<i32>, out: &Path) -> Result<Written, Error> {
+        let mut replacements = Vec::new();
+        for new in &self.textures {
+            let is_needed = new.is_fixed || form == Form::Bevy;
+            if !is_needed {
+                continue;
+            }
+            let replacement = |slot, texture: &Texture, fallback: Option<Vec<u8>>| {
+                let name = match slot {
+                    Slot::Roughness => format!("{} roughness", new.name),
+                    Slot::Normals => format!("{} normals", new.name),
+                };
+                let ktx2 = texture.to_ktx2(out, TextureEncoding::Uastc, zstd)?;
+                Ok::<_, MapError>(Replacement { slot, layers: new.layers.clone(), name, ktx2, fallback })
+            };
+            let fallback = new.fallback.as_ref().map(|finest| encoded(out, finest)).transpose()?;
+            replacements.push(replacement(Slot::Roughness, &new.roughness, fallback)?);
+            // Bevy makes no mips, so the normal map needs its own too.
+            let has_normals = |done: &Replacement| {
+                done.slot == Slot::Normals && done.layers[0].pair.normal == new.layers[0].pair.normal
+            };
+            if form == Form::Bevy {
+                match replacements.iter_mut().find(|done| has_normals(done)) {
+                    Some(done) => done.layers.extend(new.layers.iter().cloned()),
+                    None => {
+                        let normals = job::normal_texture(asset, &new.layers[0].pair)?;
+                        replacements.push(replacement(Slot::Normals, &normals, None)?);
+                    }
+                }
+            }
+        }
+        write(asset.edited(&replacements, form, out)?.files)
+    }
+
+    /// Writes every exchanged roughness texture by itself into a folder, as KTX2 and as a PNG a level.
+    ///
+    /// # Errors
+    /// [`Error`] when a texture cannot be packed, or a file cannot be written.
+    pub fn save_textures(&self, folder: &Path, zstd: Option<i32>) -> Result<Written, Error> {
+        let mut files = Vec::new();
+        for new in self.textures.iter().filter(|new| new.is_fixed) {
+            let name: String = new
+                .name
+                .chars()
+                .map(|c| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' })
+                .collect();
+            let path = |extension: &str| folder.join(format!("{name}_roughness.{extension}"));
+            let ktx2 = path("ktx2");
+            files.push(AssetFile {
+                bytes: new.roughness.to_ktx2(&ktx2, TextureEncoding::Uastc, zstd)?,
+                path: ktx2,
+            });
+            for level in 0..new.roughness.levels.len() {
+                let png = path(&format!("{level}.png"));
+                files.push(AssetFile { bytes: new.roughness.to_png(&png, level)?, path: png });
+            }
+        }
+        write(files)
+    }
+}
+
+/// PNG file of a level without alpha.
+fn encoded(path: &Path, level: &Grid<[u8; 4]>) -> Result<Vec<u8>, MapError> {
+    let texels: Vec<[u8; 3]> = level.texels().iter().map(|[r, g, b, _]| [*r, *g, *b]).collect();
+    png::encode(&texels, level.size()).map_err(|e| MapError::invalid(path, format!("cannot be encoded: {e}")))
+}
+
+/// Writes files under their names once all of them are whole.
+fn write(files: Vec<AssetFile>) -> Result<Written, Error> {
+    use std::io::Write;
+    let mut ready = Vec::new();
+    let mut written = Written { files: Vec::new(), bytes: 0 };
+    for AssetFile { path, bytes } in files {
+        if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+            std::fs::create_dir_all(folder).map_err(|e| MapError::io(folder, e))?;
+        }
+        let mut file = AtomicFile::create(&path)?;
+        file.file().write_all(&bytes).map_err(|e| MapError::io(&path, e))?;
+        ready.push(file);
+        written.bytes += bytes.len() as u64;
+        written.files.push(path);
+    }
+    ready.into_iter().try_for_each(AtomicFile::finish)?;
+    Ok(written)
+}
+
+/// Size that fits blocks of 4 × 4 texels, which `KHR_texture_basisu` asks for.
+fn fits_blocks(size: Size) -> bool {
+    size.width.is_multiple_of(4) && size.height.is_multiple_of(4)
+}
