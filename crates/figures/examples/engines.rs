@@ -1,10 +1,11 @@
 //! Models for engines to render, and a judge of what they rendered.
 //!
-//! `cargo run --release -p ndfmap-figures --example engines -- models FOLDER NAME=NORMAL[,ROUGHNESS]...` writes
-//! `NAME_stock.glb` for each: a plane to the horizon and a sphere of one metal, whose roughness is a number or
-//! a grey picture. `... -- table FOLDER [WORST]` reads pictures that engines rendered
+//! `cargo run --release -p ndfmap-figures --example engines -- models FOLDER NAME=NORMAL[,ROUGHNESS]...`
+//! writes `NAME_stock.glb` for each: a plane to the horizon and a sphere of one metal, whose roughness is a
+//! number or a grey picture. `... -- table FOLDER [WORST]` reads pictures that engines rendered
 //! (`ENGINE_MAP_OBJECT_LIGHT_FILTER_VARIANT.f32`, and their `..._truth.f32`) and prints each variant's errors
-//! and their ratios to stock. `tests/engines/run` does both.
+//! and their ratios to stock; `... -- sheet FOLDER CASE... FILE` draws them beside the truth.
+//! `tests/engines/run` does both.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::error::Error;
@@ -14,9 +15,10 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 use ndfmap::core::grid::{Grid, Size};
 use ndfmap::core::surface::SurfaceRow;
+use ndfmap::draw::{Panel, Sheet, SheetRow, Theme};
 use ndfmap::maps::formats::{png, read_file, read_image};
 use ndfmap::maps::source::{SourceOptions, read_source};
-use ndfmap::scene::metrics::{FlipTruth, Picture, relative_l2};
+use ndfmap::scene::metrics::{FlipTruth, Picture, relative_l2, to_bytes};
 use serde_json::{Value, json};
 
 /// Pixels on a side of an engine's picture.
@@ -31,9 +33,16 @@ fn main() -> Result<(), Box<dyn Error>> {
         ["models", folder, wanted @ ..] => wanted.iter().try_for_each(|spec| model(Path::new(folder), spec)),
         ["table", folder] => table(Path::new(folder), f64::INFINITY),
         ["table", folder, worst] => table(Path::new(folder), worst.parse()?),
-        _ => Err("models FOLDER NAME=NORMAL[,ROUGHNESS]..., or table FOLDER [WORST]".into()),
+        ["sheet", folder, cases @ .., file] => sheet(Path::new(folder), cases, Path::new(file)),
+        _ => Err(
+            "models FOLDER NAME=NORMAL[,ROUGHNESS]..., table FOLDER [WORST], or sheet FOLDER CASE... FILE"
+                .into(),
+        ),
     }
 }
+
+/// Variants of a model, as `tests/engines/run` makes them.
+const VARIANTS: [&str; 3] = ["stock", "kappa", "fixed"];
 
 /// Mesh of glTF.
 #[derive(Default)]
@@ -225,6 +234,7 @@ struct Errors {
 
 /// Truth where a mask is.
 struct Judge {
+    exposure: f32,
     truth: Picture,
     mask: Grid<bool>,
     pixels: f64,
@@ -237,8 +247,9 @@ impl Judge {
         let pixels = mask.texels().iter().filter(|m| **m).count() as f64;
         let truth = masked(truth, &mask);
         let mean = truth.texels().iter().map(|v| f64::from(v.element_sum()) / 3.0).sum::<f64>() / pixels;
-        let seen = FlipTruth::new(&truth, (MIDDLE / mean) as f32);
-        Self { truth, mask, pixels, seen }
+        let exposure = (MIDDLE / mean) as f32;
+        let seen = FlipTruth::new(&truth, exposure);
+        Self { exposure, truth, mask, pixels, seen }
     }
 
     fn errors(&self, picture: &Picture) -> Errors {
@@ -254,8 +265,31 @@ fn masked(picture: &Picture, mask: &Grid<bool>) -> Picture {
     Grid::from_fn(picture.size(), |x, y| if mask.row(y)[x] { picture.row(y)[x] } else { Vec3::ZERO })
 }
 
-/// Prints the errors of every picture of a folder, and the means of their ratios to stock; fails where a fixed
-/// model has a ratio above the worst that is let pass.
+/// Draws cases: the truth, and each variant with its errors.
+fn sheet(folder: &Path, cases: &[&str], file: &Path) -> Result<(), Box<dyn Error>> {
+    let picture_of = |name: &str| picture(&folder.join(format!("{name}.f32")));
+    let mut sheet = Sheet { columns: vec!["truth".to_owned()], ..Sheet::default() };
+    sheet.columns.extend(VARIANTS.map(|variant| variant.to_owned()));
+    for case in cases {
+        let parts: Vec<&str> = case.split('_').collect();
+        let [engine, map, object, light, filter] = parts[..] else { return Err("no such case".into()) };
+        let truth = picture_of(&format!("{engine}_{map}_{object}_{light}_truth"))?;
+        let judge = Judge::new(object, &truth);
+        let mut panels = vec![Some(Panel::of(to_bytes(&truth, judge.exposure)))];
+        for variant in VARIANTS {
+            let shown = picture_of(&format!("{case}_{variant}"))?;
+            let Errors { l2, flip } = judge.errors(&shown);
+            let panel = Panel::of(to_bytes(&shown, judge.exposure));
+            panels.push(Some(panel.said([format!("relative L2 {l2:.2}, FLIP {flip:.2}")])));
+        }
+        let head = [engine, map, object, light, filter].map(str::to_owned).to_vec();
+        sheet.rows.push(SheetRow { head, panels });
+    }
+    Ok(std::fs::write(file, sheet.draw(Theme::Light).to_png()?)?)
+}
+
+/// Prints the errors of every picture of a folder, and the means of their ratios to stock; fails where a
+/// fixed model has a ratio above the worst that is let pass.
 fn table(folder: &Path, passing: f64) -> Result<(), Box<dyn Error>> {
     let mut cases: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for entry in std::fs::read_dir(folder)? {

@@ -118,7 +118,8 @@ fn what_is_not_exchanged_keeps_its_bytes() {
 fn textures_that_others_use_are_left_to_them() {
     let (text, bin) = odd();
     let mut value: Value = serde_json::from_str(&text).unwrap();
-    // A second material has the roughness under other normals; an extension that nobody knows may point anywhere.
+    // A second material has the roughness under other normals; an extension that nobody knows may point
+    // anywhere.
     let mut second = value["materials"][0].clone();
     second["normalTexture"]["scale"] = json!(2);
     value["materials"].as_array_mut().unwrap().push(second);

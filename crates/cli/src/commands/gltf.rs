@@ -5,8 +5,10 @@ use std::str::FromStr as _;
 
 use clap::{Args, ValueEnum};
 use ndfmap::Error;
-use ndfmap::asset::{AssetFix, AssetJob, Written};
+use ndfmap::asset::{AssetFix, AssetJob, Written, write};
+use ndfmap::draw::Theme;
 use ndfmap::maps::asset::{Asset, Form};
+use ndfmap::maps::atomic;
 use ndfmap::roughness::Origin;
 
 use super::arguments::ZSTD;
@@ -33,6 +35,9 @@ pub(super) struct Gltf {
     /// Fit or formula of an engine for every material, whatever it does; `--help` lists them
     #[arg(long, value_name = "NAME", value_parser = Origin::from_str)]
     rule: Option<Origin>,
+    /// Also write pictures before and after into this PNG file
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
     /// Measure and say what would be done, and write nothing
     #[arg(long)]
     dry_run: bool,
@@ -52,6 +57,9 @@ enum Readers {
 impl Gltf {
     pub(super) fn run(self, json: bool) -> Result<(), Error> {
         let asset = Asset::read(&self.model)?;
+        if let Some(report) = &self.report {
+            make_way(report)?;
+        }
         let output = self.output.as_deref().filter(|_| !self.dry_run);
         if let Some(output) = output {
             self.check(&asset, output)?;
@@ -59,6 +67,12 @@ impl Gltf {
         let fix = AssetJob { asset: &asset, by: self.rule }.run(&Terminal::default())?;
         for warning in &fix.report.warnings {
             warn(&self.model, warning);
+        }
+        if let Some(report) = &self.report {
+            let name = self.model.file_name().unwrap_or_default().to_string_lossy();
+            let title = format!("{name}: a sphere and a floor at the level that gains most");
+            atomic::write(report, &fix.sheet(&title).draw(Theme::Light).to_png()?)?;
+            say_written(std::slice::from_ref(report));
         }
         let written = output.map(|output| self.write(&asset, &fix, output)).transpose()?;
         if let Some(written) = &written {
@@ -95,10 +109,13 @@ impl Gltf {
 
     fn write(&self, asset: &Asset, fix: &AssetFix, output: &Path) -> Result<Written, Error> {
         let zstd = Some(self.zstd.unwrap_or(ZSTD)).filter(|level| *level > 0);
-        match self.readers {
-            Readers::Web => fix.save(asset, Form::Web, zstd, output),
-            Readers::Bevy => fix.save(asset, Form::Bevy, zstd, output),
-            Readers::Files => fix.save_textures(output, zstd),
-        }
+        let files = match self.readers {
+            Readers::Web => fix.files(asset, Form::Web, zstd, output)?,
+            Readers::Bevy => fix.files(asset, Form::Bevy, zstd, output)?,
+            Readers::Files => fix.texture_files(output, zstd)?,
+        };
+        // Of the output itself it was said before the work.
+        files.iter().map(|file| &*file.path).filter(|path| *path != output).try_for_each(make_way)?;
+        write(files)
     }
 }

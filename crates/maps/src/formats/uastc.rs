@@ -2,10 +2,10 @@
 //! transcoder knows (Binomial, "UASTC LDR 4x4 Texture Specification").
 //!
 //! A block holds 16 texels in 128 bits. Five of its nineteen modes are written, those of one subset without
-//! alpha that have something to give: 8, one colour; 0, 192 values an end and 16 weights; 5, 256 and 8; 18, 32
-//! and 32; 6, 160 and 4, with weights of its own for one channel. For each the principal axis of the colours
-//! gives two ends, which least squares refine; the mode with the least error wins. Hints for ETC and BC1,
-//! which are only for those who transcode to them, are left at zero.
+//! alpha that have something to give: 8, one colour; 0, 192 values an end and 16 weights; 5, 256 and 8; 18,
+//! 32 and 32; 6, 160 and 4, with weights of its own for one channel. For each the principal axis of the
+//! colours gives two ends, which least squares refine; the mode with the least error wins. Hints for ETC and
+//! BC1, which are only for those who transcode to them, are left at zero.
 
 use glam::Vec3;
 use ndfmap_core::grid::Grid;

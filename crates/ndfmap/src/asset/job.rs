@@ -11,10 +11,14 @@ use ndfmap_maps::asset::{Appearance, Asset, Layer, MaterialPair, Pair};
 use ndfmap_maps::formats::ktx2::{Blocks, Texture};
 
 use super::{
-    AssetFix, AssetJob, AssetReport, Gain, LEAST_GAIN, LayerReport, NewTexture, Outcome, fits_blocks,
+    AssetFix, AssetJob, AssetReport, Gain, LEAST_GAIN, LayerReport, LayerViews, NewTexture, Outcome,
+    fits_blocks,
 };
 use crate::Error;
-use crate::roughness::{Errors, Judge, ROUGHNESS_IMPORTANCE, RoughnessJob, channel_mips, mean, mean_ratios};
+use crate::roughness::{
+    Errors, Judge, LevelReport, ROUGHNESS_IMPORTANCE, RoughnessJob, RoughnessMips, channel_mips, mean,
+    mean_ratios, ratios,
+};
 
 /// Layers that share all that their roughness mips depend on.
 struct Group {
@@ -22,6 +26,13 @@ struct Group {
     name: String,
     /// Places of their accounts.
     reports: Vec<usize>,
+}
+
+/// Outcome of a group.
+struct Grouped {
+    outcome: Outcome,
+    views: Option<LayerViews>,
+    texture: Option<NewTexture>,
 }
 
 impl AssetJob<'_> {
@@ -58,13 +69,14 @@ impl AssetJob<'_> {
             }
         }
         let mut textures: Vec<NewTexture> = Vec::new();
-        let mut warnings = Vec::new();
+        let (mut warnings, mut views) = (Vec::new(), Vec::new());
         for group in groups {
             observer.begin(&format!("roughness of `{}`", group.name));
-            let (outcome, texture) = self.group(&group, &mut warnings, observer)?;
+            let Grouped { outcome, views: seen, texture } = self.group(&group, &mut warnings, observer)?;
             for i in group.reports {
                 outcomes[i] = Some(outcome.clone());
             }
+            views.extend(seen);
             textures.extend(texture);
         }
         let report = |(found, outcome): (_, Option<Outcome>)| {
@@ -72,7 +84,7 @@ impl AssetJob<'_> {
             Some(LayerReport { material, name, layer, outcome: outcome? })
         };
         let layers = layers.into_iter().zip(outcomes).filter_map(report).collect();
-        Ok(AssetFix { report: AssetReport { layers, warnings }, textures })
+        Ok(AssetFix { report: AssetReport { layers, warnings }, views, textures })
     }
 
     fn group(
@@ -80,7 +92,7 @@ impl AssetJob<'_> {
         group: &Group,
         warnings: &mut Vec<String>,
         observer: &dyn Observer,
-    ) -> Result<(Outcome, Option<NewTexture>), Error> {
+    ) -> Result<Grouped, Error> {
         let (asset, MaterialPair { material, pair }) = (self.asset, &group.layers[0]);
         let (normals, told) = asset.normals(pair)?;
         warnings.extend(told.iter().map(|w| format!("normal map of `{}` {w}", group.name)));
@@ -89,7 +101,7 @@ impl AssetJob<'_> {
         let size = surface.size();
         if !fits_blocks(size) {
             let reason = ndfmap_maps::asset::Reason::OddSize(size);
-            return Ok((Outcome::LeftAlone(reason), None));
+            return Ok(Grouped { outcome: Outcome::LeftAlone(reason), views: None, texture: None });
         }
         let judged_as = engine_material(asset, *material, pair.layer)?;
         let job = RoughnessJob { surface: &surface, material: judged_as, by: self.by };
@@ -123,7 +135,9 @@ impl AssetJob<'_> {
             fallback,
             is_fixed,
         };
-        Ok((if is_fixed { Outcome::Fixed(gain) } else { Outcome::NoBetter(gain) }, Some(new)))
+        let views = if is_fixed { views(&group.name, &surface, &judge, &mips, observer)? } else { None };
+        let outcome = if is_fixed { Outcome::Fixed(gain) } else { Outcome::NoBetter(gain) };
+        Ok(Grouped { outcome, views, texture: Some(new) })
     }
 
     /// Errors over those of stock mips once the texture is compressed: the worse of both kinds of blocks.
@@ -154,6 +168,25 @@ impl AssetJob<'_> {
         let (astc, bc7) = (of_stock(1), of_stock(2));
         Ok(Errors { relative_l2: astc.relative_l2.max(bc7.relative_l2), flip: astc.flip.max(bc7.flip) })
     }
+}
+
+/// Pictures of the level that gains most; none where there is only one level.
+fn views(
+    name: &str,
+    surface: &RoughSurface,
+    judge: &Judge<'_>,
+    mips: &RoughnessMips,
+    observer: &dyn Observer,
+) -> Result<Option<LayerViews>, Error> {
+    let gain = |level: &&LevelReport| {
+        let Errors { relative_l2, flip } = ratios((level.made, level.stock));
+        relative_l2 + flip
+    };
+    let best = mips.report.levels.iter().min_by(|a, b| gain(a).total_cmp(&gain(b)));
+    let Some(LevelReport { level, .. }) = best else { return Ok(None) };
+    let stock = surface.bake(Widening::Rule(&PLAIN), observer)?;
+    let views = judge.views(*level, &[&stock[*level], &mips.levels[*level]]);
+    Ok(Some(LayerViews { name: name.to_owned(), level: *level, views }))
 }
 
 /// True for pairs whose roughness mips are the same.
@@ -197,6 +230,11 @@ fn byte(v: f32) -> u8 {
     (v.clamp(0.0, 1.0) * 255.0).round() as u8
 }
 
+/// Importance of occlusion and of metal beside that of roughness: metal has edges that show, occlusion is a
+/// soft shadow.
+const OCCLUSION_IMPORTANCE: f32 = 0.25;
+const METAL_IMPORTANCE: f32 = 1.0;
+
 /// Channels of a roughness texture.
 struct Channels<'a> {
     /// Old texture, whose red and blue are kept as plain mips; white where there is none.
@@ -219,10 +257,10 @@ impl Channels<'_> {
             })
         };
         // A red channel that nobody reads costs the others nothing.
-        let red = if self.holds_occlusion { 1.0 } else { 0.0 };
+        let red = if self.holds_occlusion { OCCLUSION_IMPORTANCE } else { 0.0 };
         Texture {
             levels: roughness.iter().enumerate().map(level).collect(),
-            importance: [red, ROUGHNESS_IMPORTANCE, 1.0],
+            importance: [red, ROUGHNESS_IMPORTANCE, METAL_IMPORTANCE],
         }
     }
 }

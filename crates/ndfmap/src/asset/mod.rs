@@ -28,7 +28,8 @@ use ndfmap_maps::{MapError, formats::png};
 use serde::{Serialize, Serializer};
 
 use crate::Error;
-use crate::roughness::{Errors, LevelReport, Origin};
+use crate::draw::{Panel, Sheet, SheetRow, enlarged};
+use crate::roughness::{Errors, LevelReport, Origin, View};
 
 /// Change of a glTF asset to be made.
 #[derive(Clone, Copy, Debug)]
@@ -48,8 +49,21 @@ pub const LEAST_GAIN: f64 = 0.02;
 pub struct AssetFix {
     /// Account of it.
     pub report: AssetReport,
+    /// Pictures of every layer whose texture is exchanged, at the level that gains most.
+    pub views: Vec<LayerViews>,
     /// New textures.
     textures: Vec<NewTexture>,
+}
+
+/// Pictures of a layer, and of those that share its textures.
+#[derive(Clone, Debug)]
+pub struct LayerViews {
+    /// Name of the layer.
+    pub name: String,
+    /// Level that is shown.
+    pub level: usize,
+    /// Pictures of it by stock mips and by ours, in this order.
+    pub views: Vec<View>,
 }
 
 /// New textures of layers that share them.
@@ -160,6 +174,20 @@ impl AssetFix {
     /// # Errors
     /// [`Error`] when a texture cannot be packed, or a file cannot be read or written.
     pub fn save(&self, asset: &Asset, form: Form, zstd: Option<i32>, out: &Path) -> Result<Written, Error> {
+        write(self.files(asset, form, zstd, out)?)
+    }
+
+    /// Files of the changed asset, the document last.
+    ///
+    /// # Errors
+    /// [`Error`] when a texture cannot be packed, or a file beside the asset cannot be read.
+    pub fn files(
+        &self,
+        asset: &Asset,
+        form: Form,
+        zstd: Option<i32>,
+        out: &Path,
+    ) -> Result<Vec<AssetFile>, Error> {
         let mut replacements = Vec::new();
         for new in &self.textures {
             let is_needed = new.is_fixed || form == Form::Bevy;
@@ -190,14 +218,39 @@ impl AssetFix {
                 }
             }
         }
-        write(asset.edited(&replacements, form, out)?.files)
+        Ok(asset.edited(&replacements, form, out)?.files)
     }
 
-    /// Writes every exchanged roughness texture by itself into a folder, as KTX2 and as a PNG a level.
+    /// Sheet of pictures before and after: a row an object, beside the truth.
+    #[must_use]
+    pub fn sheet(&self, title: &str) -> Sheet {
+        /// Least side of a picture, in pixels.
+        const SIDE: usize = 192;
+        let row = |(layer, view): (&LayerViews, &View)| {
+            let panel = |picture: &Grid<[u8; 3]>| Panel::of(enlarged(picture, SIDE));
+            let shaded = view.shaded.iter().zip(&view.errors).map(|(picture, errors)| {
+                let Errors { relative_l2, flip } = errors;
+                panel(picture).said([format!("relative L2 {relative_l2:.2}, FLIP {flip:.2}")])
+            });
+            SheetRow {
+                head: vec![layer.name.clone(), format!("level {}", layer.level), view.object.to_owned()],
+                panels: std::iter::once(panel(&view.truth)).chain(shaded).map(Some).collect(),
+            }
+        };
+        let views = self.views.iter().flat_map(|layer| layer.views.iter().map(move |view| (layer, view)));
+        Sheet {
+            title: title.to_owned(),
+            columns: ["truth", "stock", "fixed"].map(str::to_owned).to_vec(),
+            rows: views.map(row).collect(),
+            scale: None,
+        }
+    }
+
+    /// Files of every exchanged roughness texture by itself, for a folder: KTX2, and a PNG a level.
     ///
     /// # Errors
-    /// [`Error`] when a texture cannot be packed, or a file cannot be written.
-    pub fn save_textures(&self, folder: &Path, zstd: Option<i32>) -> Result<Written, Error> {
+    /// [`Error`] when a texture cannot be packed.
+    pub fn texture_files(&self, folder: &Path, zstd: Option<i32>) -> Result<Vec<AssetFile>, Error> {
         let mut files = Vec::new();
         for new in self.textures.iter().filter(|new| new.is_fixed) {
             let name: String = new
@@ -216,7 +269,7 @@ impl AssetFix {
                 files.push(AssetFile { bytes: new.roughness.to_png(&png, level)?, path: png });
             }
         }
-        write(files)
+        Ok(files)
     }
 }
 
@@ -226,8 +279,11 @@ fn encoded(path: &Path, level: &Grid<[u8; 4]>) -> Result<Vec<u8>, MapError> {
     png::encode(&texels, level.size()).map_err(|e| MapError::invalid(path, format!("cannot be encoded: {e}")))
 }
 
-/// Writes files under their names once all of them are whole.
-fn write(files: Vec<AssetFile>) -> Result<Written, Error> {
+/// Writes files under their names once all of them are whole; makes folders that there are not.
+///
+/// # Errors
+/// [`Error`] when a file cannot be written.
+pub fn write(files: Vec<AssetFile>) -> Result<Written, Error> {
     use std::io::Write;
     let mut ready = Vec::new();
     let mut written = Written { files: Vec::new(), bytes: 0 };

@@ -1,9 +1,9 @@
 //! Judge of roughness mips: each level as an engine shades it, beside the mean of the level's own normals.
 //!
 //! A level is laid on a sphere and on a floor, a texel a pixel, as it is seen from where that level is read.
-//! The truth of a pixel is the engine's shading of every normal under its texel; stock and fixed materials are
-//! the engine's shading of one normal and one roughness. No filter of an engine is in it: what is judged is
-//! the bake alone. Whole objects, because a highlight and the dark beside it are one picture, with one
+//! The truth of a pixel is the engine's shading of every normal under its texel; stock and fixed materials
+//! are the engine's shading of one normal and one roughness. No filter of an engine is in it: what is judged
+//! is the bake alone. Whole objects, because a highlight and the dark beside it are one picture, with one
 //! exposure: a lobe too wide is a haze over the dark. A floor too, because lobes that are right from above
 //! may be too wide where the eye grazes them.
 
@@ -19,7 +19,7 @@ use ndfmap_core::observe::{Cancelled, Observer};
 use ndfmap_core::roughness::{EngineMaterial, LEAST_ROUGHNESS, RoughSurface};
 use ndfmap_core::surface::unit_or_up;
 use ndfmap_core::units::{PerceptualRoughness, SlopeVariance};
-use ndfmap_scene::metrics::{FlipTruth, Picture, relative_l2};
+use ndfmap_scene::metrics::{FlipTruth, Picture, relative_l2, to_bytes};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -39,13 +39,15 @@ const SHOWN: f64 = 0.97;
 const FLOOR: (f64, f64) = (4.0, 40.0);
 const FLOOR_SIDE: f64 = 22.0;
 
-/// Objects, each with a sun of its own and a room: directions to the suns, and names of environments. The
-/// world has x to the right, y up, and z towards the eye, which is level; over the floor the sun stands
+/// Objects, each with a sun of its own and a room: names, directions to the suns, and names of environments.
+/// The world has x to the right, y up, and z towards the eye, which is level; over the floor the sun stands
 /// behind the horizon.
-const OBJECTS: [(Spots, DVec3, &str); 2] = [
-    (Spot::of_sphere, DVec3::new(2.0, 2.5, 3.0), "studio"),
-    (Spot::of_floor, DVec3::new(-2.5, 2.2, -1.5), "sky"),
+const OBJECTS: [(&str, Spots, DVec3, &str); 2] = [
+    (SPHERE, Spot::of_sphere, DVec3::new(2.0, 2.5, 3.0), "studio"),
+    ("floor", Spot::of_floor, DVec3::new(-2.5, 2.2, -1.5), "sky"),
 ];
+
+const SPHERE: &str = "sphere";
 
 /// Spots of an object by the places of pixels, from -1 to 1, right and up, and a sun.
 type Spots = fn(DVec2, DVec3) -> Spot;
@@ -76,6 +78,19 @@ pub const PICTURES: usize = 3 * OBJECTS.len();
 
 /// Light of one normal in every picture.
 type Lights = [f64; PICTURES];
+
+/// Pictures of an object, as a display shows them.
+#[derive(Clone, Debug)]
+pub struct View {
+    /// Name of the object.
+    pub object: &'static str,
+    /// Picture of the truth.
+    pub truth: Grid<[u8; 3]>,
+    /// Picture by each roughness map.
+    pub shaded: Vec<Grid<[u8; 3]>>,
+    /// Errors of each picture.
+    pub errors: Vec<Errors>,
+}
 
 /// Environment, as engines look it up: cubes that GGX facets have blurred.
 struct Room {
@@ -110,13 +125,9 @@ impl Spot {
         Self { frame, wo, sun: Directions::between(inside(sun.normalize()), wo) }
     }
 
-    /// Spot of the sphere. The square of the picture is the disk of the sphere, areas kept (Shirley and Chiu
-    /// 1997).
+    /// Spot of the sphere, whose disk the square of the picture is.
     fn of_sphere(at: DVec2, sun: DVec3) -> Self {
-        let (u, v) = at.into();
-        let (radius, angle) =
-            if u.abs() > v.abs() { (u, FRAC_PI_4 * v / u) } else { (v, FRAC_PI_2 - FRAC_PI_4 * u / v) };
-        let disk = SHOWN * radius * DVec2::from_angle(angle);
+        let disk = SHOWN * disk_of_square(at);
         let normal = disk.extend((1.0 - disk.length_squared()).sqrt());
         let tangent = DVec3::Y.cross(normal).normalize();
         Self::new(DMat3::from_cols(tangent, normal.cross(tangent), normal), DVec3::Z, sun)
@@ -154,7 +165,7 @@ impl Stage {
         let facets =
             Brdf::new(AnyLobe::from(Ggx::new(PerceptualRoughness::SMOOTHEST.into())), ShadingModel::Smith);
         let along = |i: usize| 2.0 * (i as f64 + 0.5) / SIDE as f64 - 1.0;
-        let object = |(spot, sun, room): (Spots, DVec3, &str)| {
+        let object = |(_, spot, sun, room): (&str, Spots, DVec3, &str)| {
             let spots = (0..SIDE * SIDE).map(|i| spot(DVec2::new(along(i % SIDE), -along(i / SIDE)), sun));
             Some(Object { spots: spots.collect(), room: Room::new(room)? })
         };
@@ -206,6 +217,7 @@ struct Truth {
 /// Picture, as it is and as the eye sees it.
 struct Shown {
     picture: Picture,
+    exposure: f32,
     seen: FlipTruth,
 }
 
@@ -251,6 +263,30 @@ impl<'a> Judge<'a> {
             observer.progress((i + 1) as f64 / self.levels.len() as f64);
         }
         Ok(all)
+    }
+
+    /// Pictures of a level by several roughness maps: each object in its room with its sun. None where the
+    /// level is not judged, or black.
+    #[must_use]
+    pub fn views(&self, level: usize, candidates: &[&Grid<f32>]) -> Vec<View> {
+        let Some(truth) = self.levels.iter().find(|truth| truth.level == level) else { return Vec::new() };
+        let shaded: Vec<Vec<Lights>> = candidates.iter().map(|r| self.shaded(truth, r)).collect();
+        let errors: Vec<[Errors; PICTURES]> = shaded.iter().map(|pixels| truth.errors(pixels)).collect();
+        let view = |(i, object): (usize, &(&'static str, Spots, DVec3, &str))| {
+            let which = 3 * i + 2;
+            let shown = truth.pictures[which].as_ref()?;
+            let displayed = |picture: &Picture| {
+                let bytes = to_bytes(picture, shown.exposure);
+                if object.0 == SPHERE { disk(&bytes) } else { bytes }
+            };
+            Some(View {
+                object: object.0,
+                truth: displayed(&shown.picture),
+                shaded: shaded.iter().map(|pixels| displayed(&picture(pixels, which))).collect(),
+                errors: errors.iter().map(|errors| errors[which]).collect(),
+            })
+        };
+        OBJECTS.iter().enumerate().filter_map(view).collect()
     }
 
     /// Pixels of a level with one normal and one roughness each.
@@ -325,6 +361,87 @@ fn picture(pixels: &[Lights], which: usize) -> Picture {
 fn shown(pixels: &[Lights], which: usize) -> Option<Shown> {
     let picture = picture(pixels, which);
     let mean = picture.texels().iter().map(|v| f64::from(v.x)).sum::<f64>() / (SIDE * SIDE) as f64;
-    let seen = (mean > 0.0).then(|| FlipTruth::new(&picture, (MIDDLE / mean) as f32))?;
-    Some(Shown { picture, seen })
+    let exposure = (mean > 0.0).then(|| (MIDDLE / mean) as f32)?;
+    Some(Shown { seen: FlipTruth::new(&picture, exposure), picture, exposure })
+}
+
+/// Place in the unit disk of a place in the square from -1 to 1, areas kept (Shirley and Chiu 1997): the
+/// longer side is the radius, the other the angle from its axis, of an eighth of a turn.
+fn disk_of_square(at: DVec2) -> DVec2 {
+    let (u, v) = at.into();
+    let (radius, angle) =
+        if u.abs() > v.abs() { (u, FRAC_PI_4 * v / u) } else { (v, FRAC_PI_2 - FRAC_PI_4 * u / v) };
+    radius * DVec2::from_angle(angle)
+}
+
+/// The way back of [`disk_of_square`].
+fn square_of_disk(at: DVec2) -> DVec2 {
+    let along = |longer: f64, other: f64| {
+        let radius = at.length().copysign(longer);
+        (radius, radius * (other / longer).atan() / FRAC_PI_4)
+    };
+    if at.x.abs() > at.y.abs() {
+        along(at.x, at.y).into()
+    } else {
+        let (v, u) = along(at.y, at.x);
+        DVec2::new(u, v)
+    }
+}
+
+/// Picture of a sphere's square as its disk, on black.
+fn disk(square: &Grid<[u8; 3]>) -> Grid<[u8; 3]> {
+    let along = |i: usize| 2.0 * (i as f64 + 0.5) / SIDE as f64 - 1.0;
+    let pixel = |v: f64| ((0.5 * (v + 1.0) * SIDE as f64) as usize).min(SIDE - 1);
+    Grid::from_fn(square.size(), |x, y| {
+        let at = DVec2::new(along(x), -along(y));
+        if at.length() >= 1.0 {
+            return [0; 3];
+        }
+        let DVec2 { x: u, y: v } = square_of_disk(at);
+        square.row(pixel(-v))[pixel(u)]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use ndfmap_core::surface::{NormalGrid, Wraps};
+
+    use super::*;
+
+    #[test]
+    fn the_disk_of_a_square_is_all_of_it_and_leads_back() {
+        let along = |i: usize| 2.0 * (i as f64 + 0.5) / SIDE as f64 - 1.0;
+        let mut quarter = 0;
+        for i in 0..SIDE * SIDE {
+            let at = DVec2::new(along(i % SIDE), along(i / SIDE));
+            let disk = disk_of_square(at);
+            // Some ten roundings.
+            assert!(disk.length() < 1.0 && square_of_disk(disk).distance(at) < 1e-14, "{at} {disk}");
+            quarter += usize::from(disk.length() < 0.5);
+        }
+        // Half the radius is a quarter of the area, and of the pixels.
+        assert_eq!(quarter, SIDE * SIDE / 4);
+    }
+
+    #[test]
+    fn a_flat_map_has_no_error_and_a_wider_lobe_has_one() {
+        let size = Size { width: 8, height: 8 };
+        let flat = NormalGrid { normals: Grid::from_fn(size, |_, _| Vec3::Z), wraps: Wraps::default() };
+        let surface = RoughSurface::new(&flat, &Grid::from_fn(size, |_, _| 0.3)).unwrap();
+        let judge =
+            Judge::new(&surface, EngineMaterial::DIELECTRIC, &ndfmap_core::observe::Unobserved).unwrap();
+        let levels = |roughness: f32| -> Vec<Grid<f32>> {
+            surface.sizes().map(|size| Grid::from_fn(size, |_, _| roughness)).collect()
+        };
+        let (same, wider) = (levels(0.3), levels(0.5));
+        for level in judge.errors(&[&same, &wider], &ndfmap_core::observe::Unobserved).unwrap() {
+            let [same, wider] = level.candidates[..] else { panic!("two were asked for") };
+            // Weights of a mean round.
+            assert!(same.iter().all(|e| e.relative_l2 < 1e-6 && e.flip < 1e-6), "{same:?}");
+            assert!(wider.iter().all(|e| e.relative_l2 > 0.01), "{wider:?}");
+        }
+        let views = judge.views(1, &[&same[1], &wider[1]]);
+        assert_eq!(views.iter().map(|view| view.object).collect::<Vec<_>>(), ["sphere", "floor"]);
+        assert_eq!(views[0].truth.texels(), views[0].shaded[0].texels());
+    }
 }

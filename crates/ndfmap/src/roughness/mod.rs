@@ -28,7 +28,7 @@ use ndfmap_core::roughness::{
 use ndfmap_core::surface::Wraps;
 use serde::{Serialize, Serializer};
 
-pub use judge::{Errors, Judge, LevelErrors, PICTURES};
+pub use judge::{Errors, Judge, LevelErrors, PICTURES, View};
 
 /// Fits that are tried. A power of 1/4 serves FLIP, and 1 relative L2; where a whole one
 /// raises a haze that FLIP punishes, a part of it may still help.
@@ -43,8 +43,8 @@ pub const FITS: [Fit; 8] = [
     Fit { objective: Objective { power: 1.0 }, share: 1.0 },
 ];
 
-/// Importance of roughness to those who compress it, beside 1 for occlusion and metal in other channels: it
-/// rules highlights, and they are smooth.
+/// Importance of roughness to those who compress it, beside 1 for other channels of its texture: it rules
+/// highlights, and is what is measured.
 pub const ROUGHNESS_IMPORTANCE: f32 = 16.0;
 
 /// Fit of which a share is taken.
@@ -268,7 +268,7 @@ fn mean_of(level: &Grid<f32>) -> f64 {
 const UNSEEN: f64 = 1e-3;
 
 /// Errors over those of stock.
-fn ratios((made, stock): (Errors, Errors)) -> Errors {
+pub(crate) fn ratios((made, stock): (Errors, Errors)) -> Errors {
     let ratio = |made: f64, stock: f64| (made + UNSEEN) / (stock + UNSEEN);
     Errors { relative_l2: ratio(made.relative_l2, stock.relative_l2), flip: ratio(made.flip, stock.flip) }
 }
@@ -279,8 +279,8 @@ pub(crate) fn mean(errors: &[Errors]) -> Errors {
     Errors { relative_l2: mean(|e| e.relative_l2), flip: mean(|e| e.flip) }
 }
 
-/// Greatest ratio to stock that is let pass in a single light.
-const PASSING: f64 = 1.02;
+/// Greatest ratio to stock that is let pass in a single light, where the means gain.
+const PASSING: f64 = 1.1;
 
 /// Index of the candidate with the least sum of ratios to the first: none of its means is worse, and in no
 /// light by more than what is let pass.
