@@ -39,6 +39,8 @@ fn model() -> tempfile::TempDir {
             { "name": "twin", "normalTexture": { "index": 0 }, "pbrMetallicRoughness": { "roughnessFactor": 0.3 } },
             { "name": "flat", "normalTexture": { "index": 1 } },
             { "name": "bare" },
+            { "name": "plastic", "normalTexture": { "index": 0 },
+                "pbrMetallicRoughness": { "roughnessFactor": 0.3, "metallicFactor": 0 } },
         ],
         "extras": { "kept": 1.0 },
     });
@@ -71,6 +73,9 @@ fn what_gains_is_exchanged_and_the_rest_is_left_alone() {
     assert_eq!(layer(0)["outcome"], layer(1)["outcome"], "materials that are alike share their texture");
     assert!(layer(2)["outcome"]["no_better"].is_object(), "{}", layer(2));
     assert_eq!(layer(3)["outcome"]["left_alone"], json!("it has no normal map"));
+    // The same maps on plastic are judged as plastic.
+    assert_ne!(layer(0)["outcome"], layer(4)["outcome"]);
+    assert_eq!((&layer(0)["texture"], &layer(1)["texture"]), (&json!("foil"), &json!("foil")));
     let (one, two) = (read(&file("one.gltf")), read(&file("two.gltf")));
     let rough =
         |i: usize| one["materials"][i]["pbrMetallicRoughness"]["metallicRoughnessTexture"]["index"].as_u64();
@@ -79,10 +84,10 @@ fn what_gains_is_exchanged_and_the_rest_is_left_alone() {
     for kept in [2, 3] {
         assert_eq!(one["materials"][kept], stock["materials"][kept]);
     }
-    // One texture: KTX2 with all levels, and a texel of the factor for those who cannot read it.
+    // One texture for both: KTX2 with all levels, and a texel of the factor for those who cannot read it.
     let names: Vec<&str> =
         one["images"].as_array().unwrap().iter().map(|i| i["uri"].as_str().unwrap()).collect();
-    assert_eq!(names, ["foil.png", "flat.png", "one-foil_roughness.ktx2", "one-foil_roughness.png"]);
+    assert_eq!(names[..4], ["foil.png", "flat.png", "one-foil_roughness.ktx2", "one-foil_roughness.png"]);
     let ktx2 = std::fs::read(file(names[2])).unwrap();
     assert_eq!(ktx2, std::fs::read(file("two-foil_roughness.ktx2")).unwrap(), "any number of threads");
     assert_eq!(two["materials"], one["materials"]);
@@ -103,7 +108,13 @@ fn loose_textures_and_bevy_and_a_dry_run() {
     let before = count();
     let (status, table, stderr) = outcome(&["gltf", &input, "--dry-run"]);
     assert_eq!((status, count()), (0, before), "{stderr}");
-    assert!(table.contains("2 of 4 layers fixed"), "{table}");
+    assert!(table.contains("of 5 layers fixed"), "{table}");
+    let sheet = file("sheet.png");
+    let (status, _, stderr) = outcome(&["gltf", &input, "--dry-run", "--report", &text(&sheet)]);
+    assert_eq!((status, count()), (0, before + 1), "{stderr}");
+    let sheet = read_image(&sheet, &std::fs::read(&sheet).unwrap()).unwrap();
+    // Three pictures of 192 pixels beside each other, and two rows a layer.
+    assert!(sheet.size.width > 3 * 192 && sheet.size.height > 2 * 192, "{:?}", sheet.size);
     let out = file("textures");
     let (status, _, stderr) =
         outcome(&["gltf", &input, "--for", "files", "--rule", "fit:0.25", "-o", &text(&out)]);
@@ -113,7 +124,7 @@ fn loose_textures_and_bevy_and_a_dry_run() {
         .map(|f| f.unwrap().file_name().to_string_lossy().into_owned())
         .collect();
     names.sort();
-    assert_eq!(names.len(), 2 * 8, "{names:?}");
+    assert_eq!(names.len(), 3 * 8, "{names:?}");
     assert!(
         names.contains(&"foil_roughness.ktx2".to_owned())
             && names.contains(&"flat_roughness.6.png".to_owned())
@@ -126,7 +137,12 @@ fn loose_textures_and_bevy_and_a_dry_run() {
     for texture in ["normalTexture", "pbrMetallicRoughness"] {
         for material in 0..3 {
             let of = &bevy["materials"][material][texture];
-            let index = of.get("index").or_else(|| of["metallicRoughnessTexture"].get("index")).unwrap();
+            let index = of.get("index").or_else(|| of["metallicRoughnessTexture"].get("index"));
+            // What is flat and has one roughness needs no mips of it.
+            let Some(index) = index else {
+                assert_eq!((material, texture), (2, "pbrMetallicRoughness"));
+                continue;
+            };
             let source = &bevy["textures"][index.as_u64().unwrap() as usize]["source"];
             let image = &bevy["images"][source.as_u64().unwrap() as usize];
             assert!(image["uri"].as_str().unwrap().ends_with(".ktx2"), "{texture} of {material}: {image}");
@@ -150,6 +166,7 @@ fn requests_that_cannot_be_met_are_refused() {
     for (words, status, says) in [
         (vec![&*model], 2, "--output"),
         (vec![&*model, "-o", &*model], 2, "not touched"),
+        (vec![&*model, "--dry-run", "--report", &*model], 2, "two outputs"),
         (vec![&*model, "-o", "out.glb"], 2, "written as a .gltf"),
         (vec![&*model, "-o", &*out, "--rule", "fit:9"], 2, "fit:POWER"),
         (vec![&*model, "-o", &*out, "--for", "unity"], 2, "web"),

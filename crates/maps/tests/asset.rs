@@ -208,6 +208,70 @@ fn a_roughness_without_a_texture_lies_as_its_normal_map_lies() {
 }
 
 #[test]
+fn files_of_a_model_do_not_meet_others() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("n.png"), texel([128, 128, 255])).unwrap();
+    let material = |scale: u32| json!({ "name": "金属", "normalTexture": { "index": 0, "scale": scale } });
+    let value = json!({
+        "asset": { "version": "2.0" }, "images": [{ "uri": "n.png" }], "textures": [{ "source": 0 }],
+        "materials": [material(1), material(2)],
+    });
+    let path = folder.path().join("m.gltf");
+    std::fs::write(&path, value.to_string()).unwrap();
+    let asset = Asset::read(&path).unwrap();
+    let replacements: Vec<Replacement> = asset
+        .layers()
+        .into_iter()
+        .map(|layer| Replacement {
+            layers: vec![MaterialPair { material: layer.material, pair: layer.pair.unwrap() }],
+            name: layer.name,
+            ..replacement(&asset, Slot::Roughness, None)
+        })
+        .collect();
+    // Two materials of one name have files of two.
+    let edited = asset.edited(&replacements, Form::Web, &folder.path().join("out.gltf")).unwrap();
+    let names = edited.files.iter().map(|file| file.path.file_name().unwrap().to_string_lossy());
+    assert_eq!(names.collect::<Vec<_>>(), ["out-__.ktx2", "out-__-2.ktx2", "out.gltf"]);
+    // In another folder lies another model's picture of the same name: it is not replaced.
+    let other = folder.path().join("other");
+    std::fs::create_dir(&other).unwrap();
+    std::fs::write(other.join("n.png"), b"another").unwrap();
+    let error = asset.edited(&[], Form::Web, &other.join("out.gltf")).unwrap_err().to_string();
+    assert!(error.contains("n.png") && error.contains("empty folder"), "{error}");
+    // The same picture is as good as a copy.
+    std::fs::write(other.join("n.png"), texel([128, 128, 255])).unwrap();
+    assert_eq!(asset.edited(&[], Form::Web, &other.join("out.gltf")).unwrap().files.len(), 1);
+}
+
+#[test]
+fn what_this_program_wrote_is_left_alone_and_other_ktx2_is_not() {
+    use ndfmap_core::grid::Grid;
+    use ndfmap_maps::formats::ktx2::{Texture, TextureEncoding};
+    let (text, bin) = odd();
+    let asset = Asset::from_bytes("odd.glb".as_ref(), &glb(&text, &bin)).unwrap();
+    let level = |side| Grid::from_fn(Size { width: side, height: side }, |_, _| [255, 50, 0, 255]);
+    let texture = Texture { levels: vec![level(2), level(1)], importance: [1.0; 3] };
+    let ours = texture.to_ktx2("t.ktx2".as_ref(), TextureEncoding::Uastc, Some(3)).unwrap();
+    let fallback = texel([255, 200, 0]);
+    let fixed = |ktx2: Vec<u8>| {
+        let replacement =
+            Replacement { ktx2, ..replacement(&asset, Slot::Roughness, Some(fallback.clone())) };
+        let bytes = document(&asset, &[replacement], Form::Web, "o.glb");
+        Asset::from_bytes("again.glb".as_ref(), &bytes).unwrap()
+    };
+    let again = fixed(ours.clone());
+    assert_eq!(again.layers()[0].pair.as_ref().unwrap_err(), &Reason::AlreadyFixed);
+    let at = ours.windows(6).position(|w| w == b"ndfmap").unwrap();
+    let mut theirs = ours;
+    theirs[at] = b'N';
+    let again = fixed(theirs);
+    let pair = again.layers()[0].pair.clone().unwrap();
+    // Engines show the KTX2, not its fallback.
+    let green = again.roughness(&pair).unwrap().unwrap().row(0)[0][1];
+    assert!((green - 50.0 / 255.0).abs() < 1e-6, "{green}");
+}
+
+#[test]
 fn layers_that_cannot_be_judged_say_why() {
     let info = json!({ "index": 0 });
     let material = |name: &str, extra: Value| {

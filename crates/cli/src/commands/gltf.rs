@@ -13,7 +13,7 @@ use ndfmap::roughness::Origin;
 
 use super::arguments::ZSTD;
 use super::roughness::rules_help;
-use super::{make_way, print, print_json, say_written, to_value};
+use super::{check_apart, make_way, print, print_json, say_written, to_value};
 use crate::tables;
 use crate::terminal::Terminal;
 use crate::voice::{say, warn};
@@ -38,7 +38,7 @@ pub(super) struct Gltf {
     /// Also write pictures before and after into this PNG file
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// Measure and say what would be done, and write nothing
+    /// Measure and say what would be done, and write no model and no texture
     #[arg(long)]
     dry_run: bool,
     /// Level of Zstandard, from 1 (fast) to 22; 0 writes textures plain [default: 3]
@@ -58,6 +58,7 @@ impl Gltf {
     pub(super) fn run(self, json: bool) -> Result<(), Error> {
         let asset = Asset::read(&self.model)?;
         if let Some(report) = &self.report {
+            check_apart([Some(report), Some(&self.model), self.output.as_ref()].into_iter().flatten())?;
             make_way(report)?;
         }
         let output = self.output.as_deref().filter(|_| !self.dry_run);
@@ -78,8 +79,14 @@ impl Gltf {
         if let Some(written) = &written {
             say_written(&written.files);
         }
-        if fix.report.fixed() == 0 {
-            say(format_args!("no texture is exchanged"));
+        match (fix.report.fixed(), self.readers) {
+            (_, Readers::Bevy) => {
+                say(format_args!(
+                    "for Bevy, every layer that was measured has KTX2, with plain mips if nothing is better"
+                ));
+            }
+            (0, _) => say(format_args!("no texture is exchanged")),
+            _ => {}
         }
         if !json {
             return print(&tables::gltf(&fix.report, written.as_ref()));
@@ -101,7 +108,11 @@ impl Gltf {
         }
         let extension = output.extension().map(|e| e.to_string_lossy().to_lowercase());
         match (asset.is_binary(), extension.as_deref()) {
-            (true, Some("glb")) | (false, Some("gltf")) => make_way(output),
+            (true, Some("glb")) | (false, Some("gltf")) => {
+                // Files beside the input that would meet others there are found now.
+                asset.edited(&[], Form::Web, output)?;
+                make_way(output)
+            }
             (true, _) => refuse("a .glb is written as a .glb"),
             (false, _) => refuse("a .gltf is written as a .gltf, with its files beside it"),
         }

@@ -1,7 +1,7 @@
 //! Edits: new textures in the places of old ones.
 //!
-//! A texture or an image is changed where it stands only when all that uses it is known and changes with it;
-//! otherwise the new one goes to the end of its list. Nothing is taken out, so no index changes.
+//! A texture is changed where it stands only when all that uses it is known and changes with it; otherwise a
+//! new one goes to the end of the list, as new images always do. Nothing is taken out, so no index changes.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -82,9 +82,24 @@ pub struct Edited {
 /// Extension that names a KTX2 picture.
 const BASIS: &str = "KHR_texture_basisu";
 
-/// Beginnings of the names of extensions that point at textures from materials alone, and at images from
-/// textures alone.
-const KNOWN: [&str; 4] = ["KHR_", "EXT_texture_", "EXT_mesh", "MSFT_texture_dds"];
+/// Extensions that point at textures from materials alone, under keys that end in `Texture`, or not at all;
+/// those of materials besides, which begin alike.
+const KNOWN: [&str; 13] = [
+    "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_texture_avif",
+    "EXT_texture_webp",
+    "KHR_animation_pointer",
+    "KHR_draco_mesh_compression",
+    "KHR_lights_punctual",
+    "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "KHR_texture_basisu",
+    "KHR_texture_transform",
+    "KHR_xmp_json_ld",
+    "MSFT_texture_dds",
+];
+const KNOWN_MATERIALS: &str = "KHR_materials_";
 
 impl Asset {
     /// Puts new textures in the place of old ones; `out` is where the document will lie.
@@ -93,6 +108,8 @@ impl Asset {
     /// [`MapError`] for an asset whose indices or lists are not what they should be, one that would be too
     /// large for its form, and files beside it that cannot be read or copied.
     pub fn edited(&self, replacements: &[Replacement], form: Form, out: &Path) -> Result<Edited, MapError> {
+        // Else even an edit of nothing might pad a chunk.
+        let untouched = replacements.is_empty().then(|| self.bytes.clone());
         let mut edit = Edit {
             asset: self,
             json: self.json.clone(),
@@ -101,6 +118,7 @@ impl Asset {
             bin: self.container.bin().map_or(0, <[u8]>::len),
             appended: Vec::new(),
             files: Vec::new(),
+            untouched,
         };
         for replacement in replacements {
             edit.replace(replacement)?;
@@ -120,6 +138,8 @@ struct Edit<'a> {
     /// Bytes that go behind it.
     appended: Vec<u8>,
     files: Vec<AssetFile>,
+    /// Bytes of the document where nothing changes.
+    untouched: Option<Vec<u8>>,
 }
 
 impl Edit<'_> {
@@ -255,7 +275,7 @@ impl Edit<'_> {
 
     /// True where a texture is used so many times in materials, and nowhere else.
     fn is_free(&self, texture: usize, uses: usize) -> bool {
-        let known = |name: &String| KNOWN.iter().any(|begins| name.starts_with(begins));
+        let known = |name: &String| KNOWN.contains(&&**name) || name.starts_with(KNOWN_MATERIALS);
         self.asset.document.extensions_used.iter().all(known)
             && self.json.get("materials").map_or(0, |materials| count(materials, texture)) == uses
     }
@@ -277,9 +297,22 @@ impl Edit<'_> {
             return self.push("images", json!({ "name": name, "uri": uri }));
         }
         let stem = self.out.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-        let file = plain(&format!("{stem}-{name}"));
+        let file = self.free_name(&plain(&format!("{stem}-{name}")));
         self.files.push(AssetFile { path: self.out.with_file_name(&file), bytes: bytes.to_vec() });
         self.push("images", json!({ "mimeType": mime, "uri": file }))
+    }
+
+    /// Name that no other new file has, and none that the document names: numbered where it is taken.
+    fn free_name(&self, name: &str) -> String {
+        let taken = |name: &str| {
+            let new = self.files.iter().filter_map(|file| file.path.file_name());
+            let new = new.map(|file| file.to_string_lossy().to_lowercase());
+            let mut old = uris(&self.json).map(str::to_lowercase);
+            new.chain(old.by_ref()).any(|other| other == name.to_lowercase())
+        };
+        let (stem, extension) = name.rsplit_once('.').unwrap_or((name, ""));
+        let numbered = (2..).map(|number| format!("{stem}-{number}.{extension}"));
+        std::iter::once(name.to_owned()).chain(numbered).find(|name| !taken(name)).unwrap_or_default()
     }
 
     /// True for a document without files beside it.
@@ -299,15 +332,20 @@ impl Edit<'_> {
                 None => buffers.push(json!({ "byteLength": length })),
             }
         }
-        let text = reprint(&asset.container.json, &self.json).map_err(|e| asset.invalid(e))?;
-        let document = asset.container.write(self.out, &text, &self.appended)?;
+        let document = match self.untouched.take() {
+            Some(bytes) => bytes,
+            None => {
+                let text = reprint(&asset.container.json, &self.json).map_err(|e| asset.invalid(e))?;
+                asset.container.write(self.out, &text, &self.appended)?
+            }
+        };
         let mut files = self.copies()?;
         files.append(&mut self.files);
         files.push(AssetFile { path: self.out.to_owned(), bytes: document });
         Ok(Edited { files })
     }
 
-    /// Files beside the input, where the output lies in another folder.
+    /// Files beside the input, where the output lies in another folder and lacks them.
     fn copies(&self) -> Result<Vec<AssetFile>, MapError> {
         let folder = |path: &Path| std::path::absolute(path.with_file_name("")).ok();
         if folder(&self.asset.path) == folder(self.out) {
@@ -323,8 +361,16 @@ impl Edit<'_> {
                 return Err(MapError::unsupported(&self.asset.path, reason));
             }
             let path = self.out.with_file_name("").join(relative);
-            if !copies.iter().any(|copy| copy.path == path) {
-                copies.push(AssetFile { path, bytes: read_file(&from)? });
+            if copies.iter().any(|copy| copy.path == path) {
+                continue;
+            }
+            let bytes = read_file(&from)?;
+            if !path.exists() {
+                copies.push(AssetFile { path, bytes });
+            } else if read_file(&path)? != bytes {
+                let reason =
+                    format!("is another file than the `{uri}` of the model: write into an empty folder");
+                return Err(MapError::unsupported(&path, reason));
             }
         }
         Ok(copies)

@@ -107,6 +107,8 @@ pub enum Reason {
     SpecularGlossiness,
     /// Its highlights have a direction.
     Anisotropic,
+    /// This program wrote its roughness texture.
+    AlreadyFixed,
     /// Its two textures lie in different places.
     LaidApart,
     /// Its two textures go on differently beyond their edges.
@@ -131,6 +133,7 @@ impl fmt::Display for Reason {
             Self::NoCoat => "its clearcoat has no weight",
             Self::SpecularGlossiness => "its gloss is that of KHR_materials_pbrSpecularGlossiness",
             Self::Anisotropic => "it is anisotropic, which one roughness cannot say",
+            Self::AlreadyFixed => "its roughness texture is of ndfmap's making",
             Self::LaidApart => "its normal map and its roughness have different coordinates",
             Self::WrappedApart => "its normal map and its roughness have different wraps",
             Self::NoMips => "its sampler reads no mips",
@@ -217,6 +220,9 @@ impl Asset {
             if !sampler(normal).wraps_as(&sampler(roughness)) {
                 return Err(Reason::WrappedApart);
             }
+        }
+        if roughness.is_some_and(|roughness| self.is_ours(roughness.index)) {
+            return Err(Reason::AlreadyFixed);
         }
         if let Some(pointer) = self.animated(index, layer) {
             return Err(Reason::Animated(pointer.to_owned()));

@@ -32,10 +32,14 @@ use crate::{Image, MapError, SourceKind};
 /// Extensions that name a texture's picture in another format, in the order in which one is chosen.
 const PICTURES: [&str; 3] = ["KHR_texture_basisu", "EXT_texture_webp", "MSFT_texture_dds"];
 
+/// Key and value by which a KTX2 file names this program.
+const WRITER: &[u8] = b"KTXwriter\0ndfmap";
+
 /// A glTF 2.0 file, of JSON or of the binary form.
 #[derive(Clone, Debug)]
 pub struct Asset {
     path: PathBuf,
+    bytes: Vec<u8>,
     container: Container,
     json: Value,
     document: Document,
@@ -75,7 +79,7 @@ impl Asset {
         if !version.starts_with("2.") {
             return Err(MapError::invalid(path, "is no glTF 2.0: its `asset.version` does not say so"));
         }
-        Ok(Self { path: path.to_owned(), container, json, document })
+        Ok(Self { path: path.to_owned(), bytes: bytes.to_vec(), container, json, document })
     }
 
     /// Name of the file.
@@ -90,14 +94,15 @@ impl Asset {
         self.container.binary.is_some()
     }
 
-    /// Index of the image that a texture shows: the core format's, or an extension's.
+    /// Index of the image that a texture shows: an extension's, which engines prefer and whose fallback may
+    /// be small, or else the core format's.
     fn picture_of(&self, texture: usize) -> Option<usize> {
         let texture = self.document.textures.get(texture)?;
         let extended = |name: &&str| {
             let source = texture.extensions.get(*name)?.get("source")?.as_u64()?;
             usize::try_from(source).ok()
         };
-        texture.source.or_else(|| PICTURES.iter().find_map(extended))
+        PICTURES.iter().find_map(extended).or(texture.source)
     }
 
     /// True where a pair's roughness texture has a picture of the core format, PNG or JPEG.
@@ -105,6 +110,18 @@ impl Asset {
     pub fn has_core_picture(&self, pair: &Pair) -> bool {
         let texture = pair.roughness.and_then(|texture| self.document.textures.get(texture));
         texture.is_some_and(|texture| texture.source.is_some())
+    }
+
+    /// True for a texture that this program wrote: its mips are its own.
+    fn is_ours(&self, texture: usize) -> bool {
+        /// Bytes of a KTX2 file that hold its keys, for any number of levels.
+        const FRONT: usize = 2048;
+        let written = |bytes: &[u8]| {
+            let front = &bytes[..bytes.len().min(FRONT)];
+            front.windows(WRITER.len()).any(|window| window == WRITER)
+        };
+        let image = self.picture_of(texture).and_then(|image| self.image_bytes(image).ok());
+        image.is_some_and(|image| written(&image.bytes))
     }
 
     fn invalid(&self, reason: impl ToString) -> MapError {

@@ -2,7 +2,7 @@
 //!
 //! A parser and a printer would keep keys and values, and lose the text of numbers, duplicates of keys and
 //! all white space. Here every value that is equal to what it was is copied; an object or an array that
-//! gained members gets them at its end, in the manner of the file.
+//! gained members gets them at its end, in the manner of the file. One that lost some is printed anew.
 
 use serde_json::Value;
 use serde_json::map::Map;

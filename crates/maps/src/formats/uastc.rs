@@ -327,7 +327,10 @@ fn ends(colours: &[Vec3; TEXELS], importance: Vec3) -> [Vec3; 2] {
         covariance += glam::Mat3::from_cols(d * d.x, d * d.y, d * d.z);
     }
     // Power iteration; half a dozen turns are enough for ends that are rounded afterwards.
-    let mut axis = Vec3::new(covariance.x_axis.x, covariance.y_axis.y, covariance.z_axis.z);
+    // The longest column is never at right angles to the axis.
+    let columns = [covariance.x_axis, covariance.y_axis, covariance.z_axis];
+    let longest = |a: Vec3, b: Vec3| if b.length_squared() > a.length_squared() { b } else { a };
+    let mut axis = columns.into_iter().fold(Vec3::ZERO, longest);
     for _ in 0..6 {
         axis = (covariance * axis).normalize_or(axis);
     }

@@ -24,6 +24,8 @@ use crate::roughness::{
 struct Group {
     layers: Vec<MaterialPair>,
     name: String,
+    /// Material that they are judged as.
+    judged_as: EngineMaterial,
     /// Places of their accounts.
     reports: Vec<usize>,
 }
@@ -48,13 +50,16 @@ impl AssetJob<'_> {
             let pair = match &found.pair {
                 Ok(pair) => pair,
                 Err(reason) => {
-                    outcomes.push(Some(Outcome::LeftAlone(reason.clone())));
+                    outcomes.push(Some((Outcome::LeftAlone(reason.clone()), None)));
                     continue;
                 }
             };
             outcomes.push(None);
             let layer = MaterialPair { material: found.material, pair: pair.clone() };
-            match groups.iter_mut().find(|group| are_alike(&group.layers[0].pair, pair)) {
+            let judged_as = engine_material(self.asset, found.material, found.layer)?;
+            let is_same =
+                |group: &&mut Group| group.judged_as == judged_as && are_alike(&group.layers[0].pair, pair);
+            match groups.iter_mut().find(is_same) {
                 Some(group) => {
                     group.layers.push(layer);
                     group.reports.push(i);
@@ -64,7 +69,7 @@ impl AssetJob<'_> {
                         Layer::Base => found.name.clone(),
                         Layer::Clearcoat => format!("{} clearcoat", found.name),
                     };
-                    groups.push(Group { layers: vec![layer], name, reports: vec![i] });
+                    groups.push(Group { layers: vec![layer], name, judged_as, reports: vec![i] });
                 }
             }
         }
@@ -74,14 +79,16 @@ impl AssetJob<'_> {
             observer.begin(&format!("roughness of `{}`", group.name));
             let Grouped { outcome, views: seen, texture } = self.group(&group, &mut warnings, observer)?;
             for i in group.reports {
-                outcomes[i] = Some(outcome.clone());
+                outcomes[i] = Some((outcome.clone(), Some(group.name.clone())));
             }
             views.extend(seen);
             textures.extend(texture);
         }
-        let report = |(found, outcome): (_, Option<Outcome>)| {
+        let report = |(found, told): (_, Option<(Outcome, Option<String>)>)| {
             let ndfmap_maps::asset::MaterialLayer { material, name, layer, .. } = found;
-            Some(LayerReport { material, name, layer, outcome: outcome? })
+            let (outcome, group) = told?;
+            let texture = group.filter(|_| matches!(outcome, Outcome::Fixed(_)));
+            Some(LayerReport { material, name, layer, texture, outcome })
         };
         let layers = layers.into_iter().zip(outcomes).filter_map(report).collect();
         Ok(AssetFix { report: AssetReport { layers, warnings }, views, textures })
@@ -93,7 +100,7 @@ impl AssetJob<'_> {
         warnings: &mut Vec<String>,
         observer: &dyn Observer,
     ) -> Result<Grouped, Error> {
-        let (asset, MaterialPair { material, pair }) = (self.asset, &group.layers[0]);
+        let (asset, pair) = (self.asset, &group.layers[0].pair);
         let (normals, told) = asset.normals(pair)?;
         warnings.extend(told.iter().map(|w| format!("normal map of `{}` {w}", group.name)));
         let values = asset.roughness(pair)?;
@@ -103,9 +110,8 @@ impl AssetJob<'_> {
             let reason = ndfmap_maps::asset::Reason::OddSize(size);
             return Ok(Grouped { outcome: Outcome::LeftAlone(reason), views: None, texture: None });
         }
-        let judged_as = engine_material(asset, *material, pair.layer)?;
-        let job = RoughnessJob { surface: &surface, material: judged_as, by: self.by };
-        let judge = Judge::new(&surface, judged_as, &observer.part(0.0, 0.35))?;
+        let job = RoughnessJob { surface: &surface, material: group.judged_as, by: self.by };
+        let judge = Judge::new(&surface, group.judged_as, &observer.part(0.0, 0.35))?;
         let mips = job.make(&judge, &observer.part(0.35, 0.85))?;
         let holds_occlusion = group.layers.iter().any(|layer| layer.pair.holds_occlusion);
         let channels = Channels { old: values.as_ref(), holds_occlusion };
@@ -189,7 +195,7 @@ fn views(
     Ok(Some(LayerViews { name: name.to_owned(), level: *level, views }))
 }
 
-/// True for pairs whose roughness mips are the same.
+/// True for pairs of the same maps and factors.
 fn are_alike(a: &Pair, b: &Pair) -> bool {
     // A coat has no occlusion and no metal, but its channels are kept all the same.
     Pair { layer: a.layer, holds_occlusion: a.holds_occlusion, ..b.clone() } == *a

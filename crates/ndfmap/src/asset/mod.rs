@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_maps::asset::{Asset, AssetFile, Form, Layer, MaterialPair, Reason, Replacement, Slot};
-use ndfmap_maps::atomic::AtomicFile;
+use ndfmap_maps::atomic;
 use ndfmap_maps::formats::ktx2::{Texture, TextureEncoding};
 use ndfmap_maps::{MapError, formats::png};
 use serde::{Serialize, Serializer};
@@ -96,6 +96,8 @@ pub struct LayerReport {
     pub name: String,
     /// Layer of it.
     pub layer: Layer,
+    /// Name of its new texture; layers that are alike share one.
+    pub texture: Option<String>,
     /// Measurement and change of it.
     pub outcome: Outcome,
 }
@@ -169,7 +171,7 @@ pub struct Written {
 }
 
 impl AssetFix {
-    /// Writes the changed asset, whole or not at all.
+    /// Writes the changed asset, file by file, the document last: each is whole or not there.
     ///
     /// # Errors
     /// [`Error`] when a texture cannot be packed, or a file cannot be read or written.
@@ -190,8 +192,7 @@ impl AssetFix {
     ) -> Result<Vec<AssetFile>, Error> {
         let mut replacements = Vec::new();
         for new in &self.textures {
-            let is_needed = new.is_fixed || form == Form::Bevy;
-            if !is_needed {
+            if !new.is_fixed && form != Form::Bevy {
                 continue;
             }
             let replacement = |slot, texture: &Texture, fallback: Option<Vec<u8>>| {
@@ -203,7 +204,10 @@ impl AssetFix {
                 Ok::<_, MapError>(Replacement { slot, layers: new.layers.clone(), name, ktx2, fallback })
             };
             let fallback = new.fallback.as_ref().map(|finest| encoded(out, finest)).transpose()?;
-            replacements.push(replacement(Slot::Roughness, &new.roughness, fallback)?);
+            // One roughness all over needs no mips.
+            if new.is_fixed || new.layers[0].pair.roughness.is_some() {
+                replacements.push(replacement(Slot::Roughness, &new.roughness, fallback)?);
+            }
             // Bevy makes no mips, so the normal map needs its own too.
             let has_normals = |done: &Replacement| {
                 done.slot == Slot::Normals && done.layers[0].pair.normal == new.layers[0].pair.normal
@@ -213,7 +217,9 @@ impl AssetFix {
                     Some(done) => done.layers.extend(new.layers.iter().cloned()),
                     None => {
                         let normals = job::normal_texture(asset, &new.layers[0].pair)?;
-                        replacements.push(replacement(Slot::Normals, &normals, None)?);
+                        if fits_blocks(normals.levels[0].size()) {
+                            replacements.push(replacement(Slot::Normals, &normals, None)?);
+                        }
                     }
                 }
             }
@@ -251,13 +257,16 @@ impl AssetFix {
     /// # Errors
     /// [`Error`] when a texture cannot be packed.
     pub fn texture_files(&self, folder: &Path, zstd: Option<i32>) -> Result<Vec<AssetFile>, Error> {
-        let mut files = Vec::new();
+        let mut files: Vec<AssetFile> = Vec::new();
+        let mut names: Vec<String> = Vec::new();
         for new in self.textures.iter().filter(|new| new.is_fixed) {
-            let name: String = new
-                .name
-                .chars()
-                .map(|c| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' })
-                .collect();
+            let plain = |c: char| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' };
+            let own: String = new.name.chars().map(plain).collect();
+            let numbered = (2..).map(|number| format!("{own}-{number}"));
+            let taken = |name: &String| names.iter().any(|other| other.to_lowercase() == name.to_lowercase());
+            let name = std::iter::once(own.clone()).chain(numbered).find(|name| !taken(name));
+            let name = name.unwrap_or_default();
+            names.push(name.clone());
             let path = |extension: &str| folder.join(format!("{name}_roughness.{extension}"));
             let ktx2 = path("ktx2");
             files.push(AssetFile {
@@ -279,25 +288,20 @@ fn encoded(path: &Path, level: &Grid<[u8; 4]>) -> Result<Vec<u8>, MapError> {
     png::encode(&texels, level.size()).map_err(|e| MapError::invalid(path, format!("cannot be encoded: {e}")))
 }
 
-/// Writes files under their names once all of them are whole; makes folders that there are not.
+/// Writes files in turn, each whole or not at all; makes folders that there are not.
 ///
 /// # Errors
-/// [`Error`] when a file cannot be written.
+/// [`Error`] when a file cannot be written; those before it stay.
 pub fn write(files: Vec<AssetFile>) -> Result<Written, Error> {
-    use std::io::Write;
-    let mut ready = Vec::new();
     let mut written = Written { files: Vec::new(), bytes: 0 };
     for AssetFile { path, bytes } in files {
         if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
             std::fs::create_dir_all(folder).map_err(|e| MapError::io(folder, e))?;
         }
-        let mut file = AtomicFile::create(&path)?;
-        file.file().write_all(&bytes).map_err(|e| MapError::io(&path, e))?;
-        ready.push(file);
+        atomic::write(&path, &bytes)?;
         written.bytes += bytes.len() as u64;
         written.files.push(path);
     }
-    ready.into_iter().try_for_each(AtomicFile::finish)?;
     Ok(written)
 }
 

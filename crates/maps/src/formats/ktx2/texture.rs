@@ -34,8 +34,8 @@ pub struct Texture {
 }
 
 /// Descriptor of UASTC with three channels (Khronos Data Format Specification 1.3, section 5.6.16): version
-/// 2, 40 bytes, its colour model, primaries of BT.709, linear, blocks of 4 × 4 texels and 16 bytes, one
-/// sample of 128 bits, from 0 to all bits.
+/// 2, 40 bytes, its colour model, no primaries (as `KHR_texture_basisu` asks for data), linear, blocks of 4 ×
+/// 4 texels and 16 bytes, one sample of 128 bits, from 0 to all bits.
 const UASTC_DESCRIPTOR: [u8; 40] = [
     0,
     0,
@@ -46,7 +46,7 @@ const UASTC_DESCRIPTOR: [u8; 40] = [
     40,
     0,
     uastc::COLOUR_MODEL,
-    1,
+    0,
     1,
     0,
     3,
@@ -312,6 +312,14 @@ mod tests {
             // 1.12.
             assert!(red == 0.0 && green < 1.2 && blue == 0.0, "{blocks:?}: {red} {green} {blue}");
         }
+        // Shallow grooves at 45 degrees: red and green run against each other.
+        let grooves = Grid::from_fn(Size { width: 64, height: 64 }, |x, y| {
+            let slope = ((x + y) % 8 * 10) as u8;
+            [80 + slope, 160 - slope, 250, 255]
+        });
+        let texture = Texture { levels: vec![grooves], importance: [1.0; 3] };
+        let [red, green, blue] = channel_errors(&texture, Blocks::Astc);
+        assert!(red < 1.0 && green < 1.0 && blue < 1.0, "{red} {green} {blue}");
         let noisy = Texture { importance: [1.0, 16.0, 1.0], ..self::texture(40) };
         let even = Texture { importance: [1.0; 3], ..noisy.clone() };
         let [weighed, equal] = [&noisy, &even].map(|texture| channel_errors(texture, Blocks::Astc));
