@@ -73,7 +73,7 @@ fn what_gains_is_exchanged_and_the_rest_is_left_alone() {
     assert_eq!(layer(0)["outcome"], layer(1)["outcome"], "materials that are alike share their texture");
     assert!(layer(2)["outcome"]["no_better"].is_object(), "{}", layer(2));
     assert_eq!(layer(3)["outcome"]["left_alone"], json!("it has no normal map"));
-    // The same maps on plastic are judged as plastic.
+    // Plastic with these maps is judged as plastic.
     assert_ne!(layer(0)["outcome"], layer(4)["outcome"]);
     assert_eq!((&layer(0)["texture"], &layer(1)["texture"]), (&json!("foil"), &json!("foil")));
     let (one, two) = (read(&file("one.gltf")), read(&file("two.gltf")));
@@ -84,7 +84,8 @@ fn what_gains_is_exchanged_and_the_rest_is_left_alone() {
     for kept in [2, 3] {
         assert_eq!(one["materials"][kept], stock["materials"][kept]);
     }
-    // One texture for both: KTX2 with all levels, and a texel of the factor for those who cannot read it.
+    // A single texture for both: KTX2 with all levels, and a texel of the factor for those who cannot read
+    // it.
     let names: Vec<&str> =
         one["images"].as_array().unwrap().iter().map(|i| i["uri"].as_str().unwrap()).collect();
     assert_eq!(names[..4], ["foil.png", "flat.png", "one-foil_roughness.ktx2", "one-foil_roughness.png"]);
@@ -138,7 +139,7 @@ fn loose_textures_and_bevy_and_a_dry_run() {
         for material in 0..3 {
             let of = &bevy["materials"][material][texture];
             let index = of.get("index").or_else(|| of["metallicRoughnessTexture"].get("index"));
-            // What is flat and has one roughness needs no mips of it.
+            // A flat layer of one roughness needs no mips of it.
             let Some(index) = index else {
                 assert_eq!((material, texture), (2, "pbrMetallicRoughness"));
                 continue;

@@ -109,7 +109,7 @@ fn what_is_not_exchanged_keeps_its_bytes() {
     let start = view["byteOffset"].as_u64().unwrap() as usize;
     assert_eq!((start % 16, &new_bin[start..start + 5]), (0, &b"ktx2!"[..]));
     assert!(value["buffers"][0]["byteLength"].as_u64().unwrap() as usize <= new_bin.len());
-    // What was written can be read and changed again.
+    // The new file can be read and changed again.
     let again = Asset::from_bytes("again.glb".as_ref(), &new).unwrap();
     assert_eq!(again.layers()[0].pair.as_ref().unwrap().factor, 1.0);
 }
@@ -238,7 +238,7 @@ fn files_of_a_model_do_not_meet_others() {
     std::fs::write(other.join("n.png"), b"another").unwrap();
     let error = asset.edited(&[], Form::Web, &other.join("out.gltf")).unwrap_err().to_string();
     assert!(error.contains("n.png") && error.contains("empty folder"), "{error}");
-    // The same picture is as good as a copy.
+    // An equal picture is as good as a copy.
     std::fs::write(other.join("n.png"), texel([128, 128, 255])).unwrap();
     assert_eq!(asset.edited(&[], Form::Web, &other.join("out.gltf")).unwrap().files.len(), 1);
 }

@@ -100,7 +100,7 @@ fn grown(
     if added.is_empty() {
         return Ok(out + rest);
     }
-    // What remains is white space and the closing bracket; of an empty one, the opening bracket too.
+    // The rest is white space and the closing bracket; of an empty one, the opening bracket too.
     let (head, close) = rest.split_at(rest.len() - 1);
     let (head, space) = head.split_at(head.trim_end().len());
     out += head;

@@ -288,7 +288,7 @@ impl Packer {
 const CHANNELS: [Option<usize>; 3] = [Some(0), Some(1), Some(2)];
 
 impl Plane {
-    /// The same with a first weight whose top bit is zero, for it is not stored.
+    /// Plane of equal values whose first weight has a top bit of zero, for it is not stored.
     fn anchored(mut self, mode: &Mode) -> Self {
         if self.weights[0] >> (mode.weight_bits - 1) != 0 {
             self.ends.swap(0, 1);

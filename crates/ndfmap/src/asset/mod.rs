@@ -129,7 +129,7 @@ pub struct Gain {
     pub levels: Vec<LevelReport>,
     /// Errors over those of stock mips, before compression.
     pub of_stock: Errors,
-    /// The same after compression: the worse of ASTC and BC7, measure by measure.
+    /// Errors over those of stock mips after compression: the worse of ASTC and BC7, measure by measure.
     pub compressed_of_stock: Errors,
 }
 
@@ -204,7 +204,7 @@ impl AssetFix {
                 Ok::<_, MapError>(Replacement { slot, layers: new.layers.clone(), name, ktx2, fallback })
             };
             let fallback = new.fallback.as_ref().map(|finest| encoded(out, finest)).transpose()?;
-            // One roughness all over needs no mips.
+            // A single roughness all over needs no mips.
             if new.is_fixed || new.layers[0].pair.roughness.is_some() {
                 replacements.push(replacement(Slot::Roughness, &new.roughness, fallback)?);
             }
