@@ -15,7 +15,7 @@ use super::reprint::reprint;
 use super::{Asset, Pair};
 use crate::MapError;
 use crate::formats::read_file;
-use crate::model::resource_path;
+use crate::model::{PICTURES, resource_path};
 
 /// Manner in which an engine finds a KTX2 texture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -108,8 +108,6 @@ impl Asset {
     /// [`MapError`] for an asset whose indices or lists are not what they should be, one that would be too
     /// large for its form, and files beside it that cannot be read or copied.
     pub fn edited(&self, replacements: &[Replacement], form: Form, out: &Path) -> Result<Edited, MapError> {
-        // Else even an edit of nothing might pad a chunk.
-        let untouched = replacements.is_empty().then(|| self.bytes.clone());
         let mut edit = Edit {
             asset: self,
             json: self.json.clone(),
@@ -118,7 +116,6 @@ impl Asset {
             bin: self.container.bin().map_or(0, <[u8]>::len),
             appended: Vec::new(),
             files: Vec::new(),
-            untouched,
         };
         for replacement in replacements {
             edit.replace(replacement)?;
@@ -138,8 +135,6 @@ struct Edit<'a> {
     /// Bytes that go behind it.
     appended: Vec<u8>,
     files: Vec<AssetFile>,
-    /// Bytes of the document where nothing changes.
-    untouched: Option<Vec<u8>>,
 }
 
 impl Edit<'_> {
@@ -216,7 +211,7 @@ impl Edit<'_> {
         };
         let mut extensions = texture.remove("extensions").unwrap_or_else(|| json!({}));
         if let Some(extensions) = extensions.as_object_mut() {
-            super::PICTURES.iter().chain(&["EXT_texture_avif"]).for_each(|name| {
+            PICTURES.iter().chain(&["EXT_texture_avif"]).for_each(|name| {
                 extensions.remove(*name);
             });
             if self.form == Form::Web {
@@ -332,12 +327,12 @@ impl Edit<'_> {
                 None => buffers.push(json!({ "byteLength": length })),
             }
         }
-        let document = match self.untouched.take() {
-            Some(bytes) => bytes,
-            None => {
-                let text = reprint(&asset.container.json, &self.json).map_err(|e| asset.invalid(e))?;
-                asset.container.write(self.out, &text, &self.appended)?
-            }
+        let document = if self.json == asset.json {
+            // Even an edit of nothing might pad a chunk.
+            asset.bytes.clone()
+        } else {
+            let text = reprint(&asset.container.json, &self.json).map_err(|e| asset.invalid(e))?;
+            asset.container.write(self.out, &text, &self.appended)?
         };
         let mut files = self.copies()?;
         files.append(&mut self.files);

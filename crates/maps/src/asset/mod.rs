@@ -25,12 +25,9 @@ use self::container::Container;
 use self::document::{Document, ImageRef, REPEAT};
 use crate::attribute::Transfer;
 use crate::formats::{read_file, read_image};
-use crate::model::{Resource, Scaled, colours, resource};
+use crate::model::{PICTURES, Resource, Scaled, colours, resource};
 use crate::source::{Convention, SourceOptions, source_of_image};
 use crate::{Image, MapError, SourceKind};
-
-/// Extensions that name a texture's picture in another format, in the order in which one is chosen.
-const PICTURES: [&str; 3] = ["KHR_texture_basisu", "EXT_texture_webp", "MSFT_texture_dds"];
 
 /// Key and value by which a KTX2 file names this program.
 const WRITER: &[u8] = b"KTXwriter\0ndfmap";

@@ -211,9 +211,14 @@ impl Packer {
             return bits.bits;
         }
         let colours = texels.map(|texel| Vec3::from_array(texel.map(f32::from)));
+        let varies = [0, 1, 2]
+            .map(|c| self.importance[c] > 0.0 && texels.iter().any(|texel| texel[c] != texels[0][c]));
+        // Where one channel alone varies, one plane has more weights for it.
+        let own = if varies.iter().filter(|v| **v).count() > 1 { varies } else { [false; 3] };
         let fitted = self.modes.iter().enumerate().flat_map(|(i, mode)| {
-            let planes: &[Option<usize>] = if mode.has_two_planes { &CHANNELS } else { &[None] };
-            planes.iter().map(move |channel| (i, *channel))
+            let shared = (!mode.has_two_planes).then_some(None);
+            let own = (0..3).filter(move |c| mode.has_two_planes && own[*c]).map(Some);
+            shared.into_iter().chain(own).map(move |channel| (i, channel))
         });
         let fitted = fitted.map(|(i, channel)| self.fitted(&colours, i, channel));
         let best = fitted.min_by(|a, b| a.error.total_cmp(&b.error));
@@ -283,9 +288,6 @@ impl Packer {
         bits.bits
     }
 }
-
-/// Channels that may have a plane of their own.
-const CHANNELS: [Option<usize>; 3] = [Some(0), Some(1), Some(2)];
 
 impl Plane {
     /// Plane of equal values whose first weight has a top bit of zero, for it is not stored.

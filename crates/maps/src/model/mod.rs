@@ -38,7 +38,7 @@ use crate::MapError;
 use crate::formats::read_file;
 
 #[cfg(feature = "gltf")]
-pub(crate) use self::gltf::{OLD as OLD_GLTF, Resource, Scaled, resource, resource_path};
+pub(crate) use self::gltf::{OLD as OLD_GLTF, PICTURES, Resource, Scaled, resource, resource_path};
 #[cfg(feature = "gltf")]
 pub(crate) use self::material::colours;
 

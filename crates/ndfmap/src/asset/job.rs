@@ -7,7 +7,7 @@ use ndfmap_core::observe::Observer;
 use ndfmap_core::roughness::{EngineMaterial, PLAIN, RoughSurface, Widening};
 use ndfmap_core::surface::{Surface, unit_or_up};
 use ndfmap_maps::MapError;
-use ndfmap_maps::asset::{Appearance, Asset, Layer, MaterialPair, Pair};
+use ndfmap_maps::asset::{Appearance, Asset, Layer, MaterialLayer, MaterialPair, Pair, Reason};
 use ndfmap_maps::formats::ktx2::{Blocks, Texture};
 
 use super::{
@@ -44,17 +44,20 @@ impl AssetJob<'_> {
     /// [`Error`] when a map cannot be read, and when the observer cancels.
     pub fn run(&self, observer: &dyn Observer) -> Result<AssetFix, Error> {
         let mut groups: Vec<Group> = Vec::new();
-        let mut outcomes = Vec::new();
         let layers = self.asset.layers();
+        let report = |i: usize, outcome: Outcome, texture: Option<String>| {
+            let MaterialLayer { material, name, layer, .. } = &layers[i];
+            LayerReport { material: *material, name: name.clone(), layer: *layer, texture, outcome }
+        };
+        let mut reports = vec![None; layers.len()];
         for (i, found) in layers.iter().enumerate() {
             let pair = match &found.pair {
                 Ok(pair) => pair,
                 Err(reason) => {
-                    outcomes.push(Some((Outcome::LeftAlone(reason.clone()), None)));
+                    reports[i] = Some(report(i, Outcome::LeftAlone(reason.clone()), None));
                     continue;
                 }
             };
-            outcomes.push(None);
             let layer = MaterialPair { material: found.material, pair: pair.clone() };
             let judged_as = engine_material(self.asset, found.material, found.layer)?;
             let is_same =
@@ -79,18 +82,13 @@ impl AssetJob<'_> {
             observer.begin(&format!("roughness of `{}`", group.name));
             let Grouped { outcome, views: seen, texture } = self.group(&group, &mut warnings, observer)?;
             for i in group.reports {
-                outcomes[i] = Some((outcome.clone(), Some(group.name.clone())));
+                let texture = matches!(outcome, Outcome::Fixed(_)).then(|| group.name.clone());
+                reports[i] = Some(report(i, outcome.clone(), texture));
             }
             views.extend(seen);
             textures.extend(texture);
         }
-        let report = |(found, told): (_, Option<(Outcome, Option<String>)>)| {
-            let ndfmap_maps::asset::MaterialLayer { material, name, layer, .. } = found;
-            let (outcome, group) = told?;
-            let texture = group.filter(|_| matches!(outcome, Outcome::Fixed(_)));
-            Some(LayerReport { material, name, layer, texture, outcome })
-        };
-        let layers = layers.into_iter().zip(outcomes).filter_map(report).collect();
+        let layers = reports.into_iter().flatten().collect();
         Ok(AssetFix { report: AssetReport { layers, warnings }, views, textures })
     }
 
@@ -107,16 +105,17 @@ impl AssetJob<'_> {
         let surface = surface(asset.path(), &*normals, values.as_ref(), pair.factor)?;
         let size = surface.size();
         if !fits_blocks(size) {
-            let reason = ndfmap_maps::asset::Reason::OddSize(size);
+            let reason = Reason::OddSize(size);
             return Ok(Grouped { outcome: Outcome::LeftAlone(reason), views: None, texture: None });
         }
+        let stock = surface.bake(Widening::Rule(&PLAIN), observer)?;
         let job = RoughnessJob { surface: &surface, material: group.judged_as, by: self.by };
         let judge = Judge::new(&surface, group.judged_as, &observer.part(0.0, 0.35))?;
         let mips = job.make(&judge, &observer.part(0.35, 0.85))?;
         let holds_occlusion = group.layers.iter().any(|layer| layer.pair.holds_occlusion);
         let channels = Channels { old: values.as_ref(), holds_occlusion };
         let texture = channels.texture(&mips.levels);
-        let compressed = self.compressed(&surface, &judge, &texture, &observer.part(0.85, 1.0))?;
+        let compressed = self.compressed(&stock, &judge, &texture, &observer.part(0.85, 1.0))?;
         let gain = Gain {
             width: size.width,
             height: size.height,
@@ -128,11 +127,7 @@ impl AssetJob<'_> {
             && compressed.flip <= 1.0
             && 1.0 - (compressed.relative_l2 + compressed.flip) / 2.0 >= LEAST_GAIN;
         let is_fixed = self.by.is_some() || is_better;
-        let roughness = if is_fixed {
-            texture
-        } else {
-            channels.texture(&surface.bake(Widening::Rule(&PLAIN), observer)?)
-        };
+        let roughness = if is_fixed { texture } else { channels.texture(&stock) };
         let fallback = fallback(&values, pair.factor, asset.has_core_picture(pair));
         let new = NewTexture {
             layers: group.layers.clone(),
@@ -141,7 +136,7 @@ impl AssetJob<'_> {
             fallback,
             is_fixed,
         };
-        let views = if is_fixed { views(&group.name, &surface, &judge, &mips, observer)? } else { None };
+        let views = if is_fixed { views(&group.name, &judge, &stock, &mips) } else { None };
         let outcome = if is_fixed { Outcome::Fixed(gain) } else { Outcome::NoBetter(gain) };
         Ok(Grouped { outcome, views, texture: Some(new) })
     }
@@ -149,7 +144,7 @@ impl AssetJob<'_> {
     /// Errors over those of stock mips once the texture is compressed: the worse of both kinds of blocks.
     fn compressed(
         &self,
-        surface: &RoughSurface,
+        stock: &[Grid<f32>],
         judge: &Judge<'_>,
         texture: &Texture,
         observer: &dyn Observer,
@@ -157,7 +152,6 @@ impl AssetJob<'_> {
         if texture.levels.len() < 2 {
             return Ok(Errors { relative_l2: 1.0, flip: 1.0 });
         }
-        let stock = surface.bake(Widening::Rule(&PLAIN), observer)?;
         let filtered = Texture { levels: texture.levels[1..].to_vec(), importance: texture.importance };
         let roughness = |blocks: Blocks| -> Result<Vec<Grid<f32>>, Error> {
             let levels = filtered.transcoded(self.asset.path(), blocks)?;
@@ -167,7 +161,7 @@ impl AssetJob<'_> {
             Ok(std::iter::once(stock[0].clone()).chain(levels.iter().map(green)).collect())
         };
         let (astc, bc7) = (roughness(Blocks::Astc)?, roughness(Blocks::Bc7)?);
-        let judged = judge.errors(&[&stock, &astc, &bc7], observer)?;
+        let judged = judge.errors(&[stock, &astc, &bc7], observer)?;
         let of_stock = |i: usize| {
             mean_ratios(judged.iter().map(|level| (mean(&level.candidates[i]), mean(&level.candidates[0]))))
         };
@@ -177,22 +171,15 @@ impl AssetJob<'_> {
 }
 
 /// Pictures of the level that gains most; none where there is only one level.
-fn views(
-    name: &str,
-    surface: &RoughSurface,
-    judge: &Judge<'_>,
-    mips: &RoughnessMips,
-    observer: &dyn Observer,
-) -> Result<Option<LayerViews>, Error> {
+fn views(name: &str, judge: &Judge<'_>, stock: &[Grid<f32>], mips: &RoughnessMips) -> Option<LayerViews> {
     let gain = |level: &&LevelReport| {
         let Errors { relative_l2, flip } = ratios((level.made, level.stock));
         relative_l2 + flip
     };
     let best = mips.report.levels.iter().min_by(|a, b| gain(a).total_cmp(&gain(b)));
-    let Some(LevelReport { level, .. }) = best else { return Ok(None) };
-    let stock = surface.bake(Widening::Rule(&PLAIN), observer)?;
+    let LevelReport { level, .. } = best?;
     let views = judge.views(*level, &[&stock[*level], &mips.levels[*level]]);
-    Ok(Some(LayerViews { name: name.to_owned(), level: *level, views }))
+    Some(LayerViews { name: name.to_owned(), level: *level, views })
 }
 
 /// True for pairs of the same maps and factors.
@@ -272,18 +259,19 @@ impl Channels<'_> {
 }
 
 /// Finest level for engines without KTX2, where the old picture is none for them or lacks the factor.
-fn fallback(values: &Option<Grid<[f32; 4]>>, factor: f32, has_core_picture: bool) -> Option<Grid<[u8; 4]>> {
-    match values {
+fn fallback(values: &Option<Grid<[f32; 4]>>, factor: f32, has_core_picture: bool) -> Option<Texture> {
+    let finest = match values {
         None => {
             let texel = [u8::MAX, byte(factor), u8::MAX, u8::MAX];
-            Some(Grid::from_fn(Size { width: 1, height: 1 }, |_, _| texel))
+            Grid::from_fn(Size { width: 1, height: 1 }, |_, _| texel)
         }
-        Some(_) if factor == 1.0 && has_core_picture => None,
-        Some(values) => Some(Grid::from_fn(values.size(), |x, y| {
+        Some(_) if factor == 1.0 && has_core_picture => return None,
+        Some(values) => Grid::from_fn(values.size(), |x, y| {
             let [r, g, b, _] = values.row(y)[x];
             [byte(r), byte(g * factor), byte(b), u8::MAX]
-        })),
-    }
+        }),
+    };
+    Some(Texture { levels: vec![finest], importance: [1.0; 3] })
 }
 
 /// Normals of a pair before their scale, with the mips that an engine would make, of unit length.

@@ -21,10 +21,10 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use ndfmap_core::grid::{Grid, Size};
+use ndfmap_maps::MapError;
 use ndfmap_maps::asset::{Asset, AssetFile, Form, Layer, MaterialPair, Reason, Replacement, Slot};
 use ndfmap_maps::atomic;
 use ndfmap_maps::formats::ktx2::{Texture, TextureEncoding};
-use ndfmap_maps::{MapError, formats::png};
 use serde::{Serialize, Serializer};
 
 use crate::Error;
@@ -73,7 +73,7 @@ struct NewTexture {
     name: String,
     roughness: Texture,
     /// Finest level, for engines without KTX2, where the old picture says something else.
-    fallback: Option<Grid<[u8; 4]>>,
+    fallback: Option<Texture>,
     /// False for plain mips, which only an engine needs that makes none.
     is_fixed: bool,
 }
@@ -203,7 +203,7 @@ impl AssetFix {
                 let ktx2 = texture.to_ktx2(out, TextureEncoding::Uastc, zstd)?;
                 Ok::<_, MapError>(Replacement { slot, layers: new.layers.clone(), name, ktx2, fallback })
             };
-            let fallback = new.fallback.as_ref().map(|finest| encoded(out, finest)).transpose()?;
+            let fallback = new.fallback.as_ref().map(|finest| finest.to_png(out, 0)).transpose()?;
             // A single roughness all over needs no mips.
             if new.is_fixed || new.layers[0].pair.roughness.is_some() {
                 replacements.push(replacement(Slot::Roughness, &new.roughness, fallback)?);
@@ -280,12 +280,6 @@ impl AssetFix {
         }
         Ok(files)
     }
-}
-
-/// PNG file of a level without alpha.
-fn encoded(path: &Path, level: &Grid<[u8; 4]>) -> Result<Vec<u8>, MapError> {
-    let texels: Vec<[u8; 3]> = level.texels().iter().map(|[r, g, b, _]| [*r, *g, *b]).collect();
-    png::encode(&texels, level.size()).map_err(|e| MapError::invalid(path, format!("cannot be encoded: {e}")))
 }
 
 /// Writes files in turn, each whole or not at all; makes folders that there are not.

@@ -39,18 +39,24 @@ const SHOWN: f64 = 0.97;
 const FLOOR: (f64, f64) = (4.0, 40.0);
 const FLOOR_SIDE: f64 = 22.0;
 
-/// Objects, each with a sun of its own and a room: names, directions to the suns, and names of environments.
-/// The world has x to the right, y up, and z towards the eye, which is level; over the floor the sun stands
-/// behind the horizon.
-const OBJECTS: [(&str, Spots, DVec3, &str); 2] = [
-    (SPHERE, Spot::of_sphere, DVec3::new(2.0, 2.5, 3.0), "studio"),
-    ("floor", Spot::of_floor, DVec3::new(-2.5, 2.2, -1.5), "sky"),
+/// Object that a level is laid on, with what lights it.
+struct Setting {
+    name: &'static str,
+    /// Spots by the places of pixels, from -1 to 1, right and up, and a sun.
+    spot: fn(DVec2, DVec3) -> Spot,
+    /// Direction to the sun.
+    sun: DVec3,
+    /// Name of the environment.
+    room: &'static str,
+}
+
+/// Objects, each with a sun of its own and a room. The world has x to the right, y up, and z towards the eye,
+/// which is level; over the floor the sun stands behind the horizon.
+const OBJECTS: [Setting; 2] = [
+    Setting { name: SPHERE, spot: Spot::of_sphere, sun: DVec3::new(2.0, 2.5, 3.0), room: "studio" },
+    Setting { name: "floor", spot: Spot::of_floor, sun: DVec3::new(-2.5, 2.2, -1.5), room: "sky" },
 ];
-
 const SPHERE: &str = "sphere";
-
-/// Spots of an object by the places of pixels, from -1 to 1, right and up, and a sun.
-type Spots = fn(DVec2, DVec3) -> Spot;
 
 /// Irradiance of a sun that shines into a room, over the room's own mean radiance.
 const SUN_IN_ROOM: f64 = 4.0;
@@ -165,7 +171,7 @@ impl Stage {
         let facets =
             Brdf::new(AnyLobe::from(Ggx::new(PerceptualRoughness::SMOOTHEST.into())), ShadingModel::Smith);
         let along = |i: usize| 2.0 * (i as f64 + 0.5) / SIDE as f64 - 1.0;
-        let object = |(_, spot, sun, room): (&str, Spots, DVec3, &str)| {
+        let object = |Setting { spot, sun, room, .. }: Setting| {
             let spots = (0..SIDE * SIDE).map(|i| spot(DVec2::new(along(i % SIDE), -along(i / SIDE)), sun));
             Some(Object { spots: spots.collect(), room: Room::new(room)? })
         };
@@ -272,15 +278,15 @@ impl<'a> Judge<'a> {
         let Some(truth) = self.levels.iter().find(|truth| truth.level == level) else { return Vec::new() };
         let shaded: Vec<Vec<Lights>> = candidates.iter().map(|r| self.shaded(truth, r)).collect();
         let errors: Vec<[Errors; PICTURES]> = shaded.iter().map(|pixels| truth.errors(pixels)).collect();
-        let view = |(i, object): (usize, &(&'static str, Spots, DVec3, &str))| {
+        let view = |(i, Setting { name, .. }): (usize, &Setting)| {
             let which = 3 * i + 2;
             let shown = truth.pictures[which].as_ref()?;
             let displayed = |picture: &Picture| {
                 let bytes = to_bytes(picture, shown.exposure);
-                if object.0 == SPHERE { disk(&bytes) } else { bytes }
+                if *name == SPHERE { disk(&bytes) } else { bytes }
             };
             Some(View {
-                object: object.0,
+                object: name,
                 truth: displayed(&shown.picture),
                 shaded: shaded.iter().map(|pixels| displayed(&picture(pixels, which))).collect(),
                 errors: errors.iter().map(|errors| errors[which]).collect(),

@@ -319,7 +319,8 @@ mod tests {
         });
         let texture = Texture { levels: vec![grooves], importance: [1.0; 3] };
         let [red, green, blue] = channel_errors(&texture, Blocks::Astc);
-        assert!(red < 1.0 && green < 1.0 && blue < 1.0, "{red} {green} {blue}");
+        // Rounding of ends: 0.44, 0.69 and 0. A search that misses the axis has 3.8, 3.2 and 2.
+        assert!(red < 0.5 && green < 0.75 && blue == 0.0, "{red} {green} {blue}");
         let noisy = Texture { importance: [1.0, 16.0, 1.0], ..self::texture(40) };
         let even = Texture { importance: [1.0; 3], ..noisy.clone() };
         let [weighed, equal] = [&noisy, &even].map(|texture| channel_errors(texture, Blocks::Astc));

@@ -22,8 +22,8 @@ const READ_EXTENSIONS: [&str; 7] = [
     "MSFT_texture_dds",
 ];
 
-/// Extensions that name a texture's picture in another format.
-const PICTURES: [&str; 3] = ["EXT_texture_webp", "KHR_texture_basisu", "MSFT_texture_dds"];
+/// Extensions that name a texture's picture in another format, in the order in which one is chosen.
+pub(crate) const PICTURES: [&str; 3] = ["KHR_texture_basisu", "EXT_texture_webp", "MSFT_texture_dds"];
 
 /// Document and its buffers.
 pub(super) struct Opened<'a> {

@@ -12,7 +12,7 @@ mod document;
 mod meshopt;
 mod textures;
 
-pub(crate) use self::document::{OLD, Resource, resource, resource_path};
+pub(crate) use self::document::{OLD, PICTURES, Resource, resource, resource_path};
 pub(crate) use self::textures::Scaled;
 
 use std::collections::{HashMap, HashSet};
