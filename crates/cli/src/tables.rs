@@ -7,6 +7,7 @@ use ndfmap::compare::{Comparison, three_digits};
 use ndfmap::core::measure::{Estimate, FilteringError, SURE, UNSEEN};
 use ndfmap::render::{DriftReport, RenderReport};
 use ndfmap::roughness::{Errors, RoughnessMips};
+use ndfmap::scene::Camera;
 use ndfmap_figures::{Claim, Made, Paper, TABLE, Verdict, digits};
 
 /// List of the figures of the papers.
@@ -65,7 +66,8 @@ pub(crate) fn gltf(report: &AssetReport, written: Option<&Written>) -> String {
     }
     text += &format!("\n{} of {} layers fixed", report.fixed(), report.layers.len());
     if let Some(Written { files, bytes }) = written {
-        text += &format!("; {bytes} bytes in {} files", files.len());
+        let plural = if files.len() == 1 { "" } else { "s" };
+        text += &format!("; {bytes} bytes in {} file{plural}", files.len());
     }
     text + "\n"
 }
@@ -182,9 +184,9 @@ pub(crate) fn rendering(report: &RenderReport) -> String {
     let name = report.methods.iter().map(String::len).max().unwrap_or(0).max("method".len());
     let measured = report.methods().any(|(_, said)| said.error.is_some());
     let columns = if measured { "  color_error  relative_l2  brightness    FLIP  sparkle" } else { "" };
-    let mut text = format!("{:name$}  frame ms{columns}\n", "method");
+    let mut text = format!("{:name$}  bake s  frame ms{columns}\n", "method");
     for (method, said) in report.methods() {
-        text += &format!("{method:name$} {:>9.1}", said.frame_ms.median);
+        text += &format!("{method:name$}  {:>6.1} {:>9.1}", said.bake_seconds, said.frame_ms.median);
         if let Some(e) = said.error {
             let sparkle = e.sparkle.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
             text += &format!(
@@ -195,6 +197,8 @@ pub(crate) fn rendering(report: &RenderReport) -> String {
         text.push('\n');
     }
     for f in &report.frames {
+        let camera = numbers_of(&f.camera).map(six_digits).join(",");
+        text += &format!("camera at time {}: {camera}\n", f.time);
         if let Some(truth) = f.truth {
             text += &format!(
                 "truth at time {}: {} rays a pixel, noise {:.4}, {:.1} s\n",
@@ -206,6 +210,19 @@ pub(crate) fn rendering(report: &RenderReport) -> String {
         }
     }
     text
+}
+
+/// Numbers of a camera as `--camera` takes them: eye, target, degrees.
+pub(crate) fn numbers_of(camera: &Camera) -> [f64; 7] {
+    let ([a, b, c], [d, e, f]) = (camera.eye.to_array(), camera.target.to_array());
+    [a, b, c, d, e, f, camera.degrees]
+}
+
+/// Number with six digits that count, and no more than it needs.
+fn six_digits(value: f64) -> String {
+    let rounded = format!("{value:.5e}").parse().unwrap_or(value);
+    // Zero has no sign that anybody wants to read.
+    format!("{}", rounded + 0.0)
 }
 
 /// Line about a baked map.

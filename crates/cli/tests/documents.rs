@@ -52,6 +52,19 @@ fn errors_of_methods_come_out() {
 }
 
 #[test]
+fn errors_of_engines_come_out() {
+    let rows = table("roughness.md", "## Your engine's number");
+    let (rules, methods): (Vec<&str>, Vec<&str>) =
+        rows[1..].iter().map(|row| row[0].as_str()).partition(|name| name.starts_with("rule:"));
+    let command = ["compare", "builtin:foil", "--map-size", "256", "--rule", "all", "--brdf", "ggx:0.16"];
+    let told = json(&[&command[..], &["--json", "--method", &methods.join(",")]].concat());
+    assert_eq!(rules.len(), ndfmap::core::roughness::TABLE.len());
+    compare(&rows, |method, level| {
+        three_digits(told["methods"][method]["levels"][level]["error"].as_f64().unwrap())
+    });
+}
+
+#[test]
 fn errors_of_printed_forms_come_out() {
     let rows = table("methods.md", "## Printed forms");
     let told = told(&rows, &["--filtering"]);

@@ -85,6 +85,15 @@ impl From<Alpha> for SlopeVariance {
     }
 }
 
+impl TryFrom<SlopeVariance> for Alpha {
+    type Error = UnitError;
+
+    /// The GGX lobe as wide as that, by the same rule.
+    fn try_from(variance: SlopeVariance) -> Result<Self, UnitError> {
+        Self::new((2.0 * variance.0).sqrt())
+    }
+}
+
 impl From<Exponent> for SlopeVariance {
     /// `1 / s`, the width for which Han et al.'s `s' = kappa s / (kappa + s)` is an addition of variances.
     fn from(s: Exponent) -> Self {

@@ -61,6 +61,7 @@ fn measured(
         lobe: &**lobe,
         methods,
         baked: &[],
+        engines: &[],
         precision: Precision::Half,
         filtering: true,
     };

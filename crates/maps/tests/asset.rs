@@ -244,6 +244,72 @@ fn files_of_a_model_do_not_meet_others() {
 }
 
 #[test]
+fn a_document_and_its_files_become_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
+    write("n.png", &texel([128, 128, 255]));
+    write("a.bin", b"0123456789ABCDEFGHI");
+    let inline = format!("data:application/octet-stream;base64,{}", "QUJDREVGR0g=");
+    let meshopt =
+        json!({ "EXT_meshopt_compression": { "buffer": 0, "byteOffset": 1, "byteLength": 9, "count": 3 } });
+    let value = json!({
+        "asset": { "version": "2.0" },
+        "buffers": [
+            { "name": "first", "uri": "a.bin", "byteLength": 17 },
+            { "byteLength": 40, "extensions": { "EXT_meshopt_compression": { "fallback": true } } },
+            { "uri": inline, "byteLength": 8 },
+        ],
+        "bufferViews": [
+            { "buffer": 0, "byteOffset": 2, "byteLength": 5 },
+            { "buffer": 1, "byteLength": 40, "extensions": meshopt },
+            { "buffer": 2, "byteOffset": 3, "byteLength": 4 },
+        ],
+        "images": [{ "uri": "n.png", "name": "normals" }, { "bufferView": 2, "mimeType": "image/png" }],
+        "textures": [{ "source": 0 }], "materials": [{ "normalTexture": { "index": 0 } }],
+        "extensionsUsed": ["EXT_meshopt_compression"], "extras": { "kept": 1.50 },
+    });
+    let path = folder.path().join("m.gltf");
+    let text = value.to_string().replace("1.5}", "1.50}");
+    std::fs::write(&path, &text).unwrap();
+    let packed = Asset::read(&path).unwrap().packed().unwrap();
+    assert!(packed.is_binary());
+    let bytes = &packed.edited(&[], Form::Web, "out.glb".as_ref()).unwrap().files[0].bytes;
+    let (json, bin, _) = parts(bytes);
+    assert!(json.contains("1.50"), "numbers keep their text");
+    let packed: Value = serde_json::from_str(&json).unwrap();
+    let of = |view: &Value| {
+        let number = |key: &str| usize::try_from(view[key].as_u64().unwrap_or(0)).unwrap();
+        bin[number("byteOffset")..][..number("byteLength")].to_vec()
+    };
+    let views = packed["bufferViews"].as_array().unwrap();
+    assert_eq!((of(&views[0]), of(&views[2])), (b"23456".to_vec(), b"DEFG".to_vec()));
+    assert_eq!(
+        (&views[0]["buffer"], &views[1]["buffer"], &views[2]["buffer"]),
+        (&json!(0), &json!(1), &json!(0))
+    );
+    assert_eq!(of(&views[1]["extensions"]["EXT_meshopt_compression"]), b"123456789");
+    // The fallback has no bytes, and none are made for it.
+    assert_eq!(packed["buffers"].as_array().unwrap().len(), 2);
+    assert_eq!(packed["buffers"][0]["name"], "first");
+    assert_eq!(packed["buffers"][1], value["buffers"][1]);
+    assert!(packed["buffers"][0]["byteLength"].as_u64().unwrap() <= bin.len() as u64);
+    let image = &packed["images"][0];
+    assert_eq!((&image["name"], &image["mimeType"]), (&json!("normals"), &json!("image/png")));
+    assert_eq!(of(&views[image["bufferView"].as_u64().unwrap() as usize]), texel([128, 128, 255]));
+    // Files that lie about their length, and views of nothing.
+    for (from, to, says) in [
+        ("\"byteLength\":17", "\"byteLength\":20", "of the 20 bytes of buffer 0"),
+        ("\"buffer\":2", "\"buffer\":7", "not there"),
+        ("a.bin", "b.bin", "b.bin"),
+    ] {
+        let bad = text.replacen(from, to, 1);
+        assert_ne!(bad, text);
+        let error = Asset::from_bytes(&path, bad.as_bytes()).unwrap().packed().unwrap_err().to_string();
+        assert!(error.contains(says), "{says}: {error}");
+    }
+}
+
+#[test]
 fn what_this_program_wrote_is_left_alone_and_other_ktx2_is_not() {
     use ndfmap_core::grid::Grid;
     use ndfmap_maps::formats::ktx2::{Texture, TextureEncoding};
@@ -375,6 +441,7 @@ fn edit(bytes: &[u8]) {
         }
     }
     let all = replacement(&asset, Slot::Roughness, None);
+    let _ = asset.clone().packed();
     if let Ok(edited) = asset.edited(&[all], Form::Web, "h.glb".as_ref()) {
         let document = &edited.files.last().unwrap().bytes;
         Asset::from_bytes("again.glb".as_ref(), document).unwrap();

@@ -13,7 +13,7 @@ use ndfmap_core::surface::Surface;
 use serde::Serialize;
 
 use crate::Error;
-use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::ndf::{AnyMethod, Shows};
 
 /// Methods to choose from: one of each kind and size that is the best of its size on some map.
 const CANDIDATES: [&str; 13] = [
@@ -126,8 +126,9 @@ impl Auto<'_> {
         }
         observer.begin("errors");
         let truth = TexelTruth::new(self.surface, self.lobe, &lattice);
+        let shown = methods.iter().map(|method| -> &dyn Shows { &**method });
         let map = |(pyramid, method)| BakedMap { pyramid, method };
-        let maps: Vec<BakedMap<'_>> = pyramids.iter().zip(methods.iter().map(|m| &**m)).map(map).collect();
+        let maps: Vec<BakedMap<'_>> = pyramids.iter().zip(shown).map(map).collect();
         let errors = filtering_errors(&truth, self.surface.wraps(), &levels, &maps, observer)?;
         let candidate = |(method, errors): (&AnyMethod, &Vec<FilteringError>)| {
             let worst = errors.iter().map(|e| e.filtered).max_by(|a, b| a.error.total_cmp(&b.error));

@@ -1,22 +1,26 @@
 //! Bakes a surface with several methods and measures each against the truth, level by level.
 
+use std::iter::repeat;
 use std::path::PathBuf;
 use std::time::Instant;
 
 use ndfmap_core::bake::Bake;
 use ndfmap_core::brdf::Lobe;
-use ndfmap_core::grid::Size;
+use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::measure::{
     BakedMap, Estimate, FilteringError, LevelErrors, TexelTruth, filtering_errors, lattice_for, level_errors,
 };
-use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::ndf::{AnyMethod, Shows};
 use ndfmap_core::observe::Observer;
 use ndfmap_core::pyramid::{Precision, Pyramid, level_sizes};
+use ndfmap_core::roughness::{EngineLobe, RoughSurface};
 use ndfmap_core::surface::Surface;
+use ndfmap_core::units::{Alpha, PerceptualRoughness};
 use ndfmap_maps::{MapError, NdfMap};
 use serde::{Serialize, Serializer};
 
 use crate::Error;
+use crate::roughness::Origin;
 
 /// Subject of a comparison.
 pub struct Subject<'a> {
@@ -30,6 +34,8 @@ pub struct Subject<'a> {
     pub methods: &'a [AnyMethod],
     /// Maps that were baked from it before, each with its name.
     pub baked: &'a [BakedFile],
+    /// Formulas and fits of one lobe, as engines' own materials shade them: about the mean normal made unit.
+    pub engines: &'a [Origin],
     /// Bits of a stored channel.
     pub precision: Precision,
     /// True to measure between texels too.
@@ -70,7 +76,7 @@ pub struct Comparison {
 /// Map and errors of one method.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// Spelling of the method, or name of a baked file.
+    /// Spelling of the method, name of a baked file, or `rule:` and the name of an engine's formula or a fit.
     #[serde(skip)]
     pub method: String,
     /// Bytes of a texel of the finest level.
@@ -166,7 +172,7 @@ pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Compari
         }
     }
     let mut rows = Vec::new();
-    let mut methods = Vec::new();
+    let mut methods: Vec<AnyMethod> = Vec::new();
     for BakedFile { path, map } in subject.baked {
         methods.push(map.method(path)?);
         rows.push(Row {
@@ -193,13 +199,12 @@ pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Compari
             pyramid,
         });
     }
+    rows.extend(engines(subject, observer)?);
     observer.begin("errors");
     let truth = TexelTruth::new(subject.surface, subject.lobe, &lattice);
-    let maps: Vec<BakedMap<'_>> = rows
-        .iter()
-        .zip(&methods)
-        .map(|(row, method)| BakedMap { pyramid: &row.pyramid, method: &**method })
-        .collect();
+    let shown = methods.iter().map(|method| -> &dyn Shows { &**method }).chain(repeat(&EngineLobe as _));
+    let maps: Vec<BakedMap<'_>> =
+        rows.iter().zip(shown).map(|(row, method)| BakedMap { pyramid: &row.pyramid, method }).collect();
     let part = if subject.filtering { 0.5 } else { 1.0 };
     let LevelErrors { maps: levels, factoring } = level_errors(&truth, &maps, &observer.part(0.0, part))?;
     // Level 0 is the map itself, filtered as maps have always been.
@@ -220,6 +225,41 @@ pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Compari
         factoring: of_levels(&factoring),
         rows,
     })
+}
+
+/// Rows of what engines' own materials make of the map.
+fn engines(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Vec<Row>, Error> {
+    if subject.engines.is_empty() {
+        return Ok(Vec::new());
+    }
+    let lobe = subject.lobe;
+    let width = lobe.slope_variance().filter(|_| lobe.measured().is_none());
+    let roughness = width.and_then(|width| Alpha::try_from(width).ok()).map(PerceptualRoughness::from);
+    let Some(roughness) = roughness.filter(|roughness| roughness.get() <= 1.0) else {
+        let why =
+            "an engine's formula widens the roughness of a highlight, from 0 to 1, which this lobe has not";
+        return Err(Error::Request(format!("{lobe}: {why}")));
+    };
+    let size = subject.surface.size();
+    let roughness = Grid::from_fn(size, |_, _| roughness.get() as f32);
+    let surface =
+        RoughSurface::new(subject.surface, &roughness).map_err(|e| Error::Request(e.to_string()))?;
+    let row = |origin: &Origin| {
+        let method = format!("rule:{origin}");
+        observer.begin(&method);
+        let start = Instant::now();
+        let levels = origin.levels(&surface, observer)?;
+        let pyramid = EngineLobe::map(&surface, &levels, subject.precision, subject.surface.wraps());
+        Ok(Row {
+            method,
+            bytes_per_texel: subject.precision.texel_bytes(),
+            bake_seconds: start.elapsed().as_secs_f64(),
+            pyramid: pyramid.unwrap_or_else(|_| unreachable!("roughness of every level of the surface")),
+            levels: Vec::new(),
+            filtering: Vec::new(),
+        })
+    };
+    subject.engines.iter().map(row).collect()
 }
 
 /// A number in six columns, three significant digits where it matters.

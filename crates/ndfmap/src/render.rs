@@ -8,7 +8,7 @@ use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::observe::Observer;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_scene::metrics::{Picture, change, color_error, flip, relative_l2};
-use ndfmap_scene::{Effort, Scene};
+use ndfmap_scene::{Camera, Effort, Scene};
 use ndfmap_trace::{DRIFT_FRAMES, drifted};
 use serde::Serialize;
 
@@ -45,6 +45,8 @@ pub struct RenderJob<'a> {
 pub struct Frame {
     /// When, 0 to 1.
     pub time: f64,
+    /// Camera of its pictures.
+    pub camera: Camera,
     /// Factor on light, before display values take sRGB of it.
     pub exposure: f32,
     /// The truth, where there is one.
@@ -305,7 +307,7 @@ impl<E: Engine> Shot<'_, E> {
         let (results, drawn): (Vec<MethodResult>, Vec<Picture>) = results.into_iter().unzip();
         let said = truth.as_ref().map(|t| FrameTruth { rays: t.rays, noise: t.noise, seconds });
         let pictures = truth.map(|t| t.picture).into_iter().chain(drawn).collect();
-        Ok(Frame { time, exposure, truth: said, drifting, results, pictures, drifts })
+        Ok(Frame { time, camera: scene.camera, exposure, truth: said, drifting, results, pictures, drifts })
     }
 }
 

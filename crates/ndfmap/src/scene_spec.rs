@@ -31,6 +31,8 @@ pub struct SceneSpec {
     pub shading: Option<ShadingModel>,
     /// Camera.
     pub camera: Option<CameraSpec>,
+    /// Factor on the camera's distance from what it looks at, greater than 0; `None` for 1.
+    pub distance: Option<f64>,
     /// Lights.
     pub lights: Vec<Light>,
     /// Diffuse albedo of the first material, linear RGB.
@@ -142,6 +144,9 @@ impl SceneSpec {
         if let Some(camera) = self.camera {
             let degrees = camera.degrees.unwrap_or(scene.camera.degrees);
             scene.camera = Camera::new(camera.eye.into(), camera.target.into(), degrees);
+        }
+        if let Some(distance) = self.distance {
+            scene.camera = scene.camera.at_distance(distance);
         }
         if !self.lights.is_empty() || self.environment.is_some() {
             scene.lights.clone_from(&self.lights);

@@ -29,6 +29,12 @@ impl Camera {
         Self { eye, target, up, degrees, shift: DVec2::ZERO }
     }
 
+    /// The camera at a multiple of its distance from what it looks at.
+    #[must_use]
+    pub fn at_distance(self, factor: f64) -> Self {
+        Self { eye: self.target + (self.eye - self.target) * factor, ..self }
+    }
+
     /// The rays of a picture of this size.
     #[must_use]
     pub fn rays(&self, size: Size) -> Rays {

@@ -10,11 +10,13 @@ use ndfmap::core::grid::Size;
 use ndfmap::core::lookup::Lookups;
 use ndfmap::core::ndf::AnyMethod;
 use ndfmap::core::pyramid;
+use ndfmap::core::roughness;
 use ndfmap::maps::atomic;
 use ndfmap::maps::formats::{read_file, read_ndf};
 use ndfmap::maps::source::SourceMap;
 use ndfmap::render::{Device, RenderJob, RenderReport, render};
 use ndfmap::report::{self, Pages, ReportFile};
+use ndfmap::roughness::Origin;
 use ndfmap::scene::Effort;
 use ndfmap::{Error, SceneSpec};
 
@@ -45,6 +47,10 @@ pub(super) struct Compare {
     /// Measure these files too, which were baked from the map, as they are; without `--method`, them alone
     #[arg(long, value_name = "FILE", value_delimiter = ',')]
     baked: Vec<PathBuf>,
+    /// Measure what an engine's own material makes of the map too: formulas that engines ship and fits, as in
+    /// `ndfmap roughness`, or `all` formulas; the lobe's width is the roughness
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    rule: Vec<String>,
     /// The reflectance lobe they are measured with
     #[arg(long, default_value = "blinn-phong:50", value_parser = brdf_spelling)]
     brdf: String,
@@ -107,6 +113,19 @@ impl Compare {
         if self.sparkle {
             check_drift(self.size)?;
         }
+        let mut engines: Vec<Origin> = Vec::new();
+        for name in &self.rule {
+            let named = if name.eq_ignore_ascii_case("all") {
+                roughness::TABLE.iter().map(|row| Origin::Rule(row.name)).collect()
+            } else {
+                vec![name.parse::<Origin>().map_err(|e| Error::Request(format!("--rule {name}: {e}")))?]
+            };
+            for origin in named {
+                if !engines.contains(&origin) {
+                    engines.push(origin);
+                }
+            }
+        }
         let map = self.source.read(&self.map, &self.builtin)?;
         let baked = self.baked.iter().map(|path| open_baked(path, &map)).collect::<Result<Vec<_>, _>>()?;
         let environment = self.environment.read()?;
@@ -115,6 +134,7 @@ impl Compare {
             map: &map,
             methods: &methods,
             baked: &baked,
+            engines: &engines,
             brdf: &*brdf,
             precision: self.precision.into(),
             filtering: self.filtering,
@@ -183,6 +203,7 @@ pub(super) struct Run<'a> {
     pub(super) map: &'a SourceMap,
     pub(super) methods: &'a [AnyMethod],
     pub(super) baked: &'a [BakedFile],
+    pub(super) engines: &'a [Origin],
     pub(super) brdf: &'a dyn Lobe,
     pub(super) precision: pyramid::Precision,
     pub(super) filtering: bool,
@@ -221,6 +242,7 @@ impl Run<'_> {
             lobe: self.brdf,
             methods: self.methods,
             baked: self.baked,
+            engines: self.engines,
             precision: self.precision,
             filtering: self.filtering,
         };

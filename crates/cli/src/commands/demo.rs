@@ -74,6 +74,7 @@ impl Demo {
             map: &map,
             methods: &methods,
             baked: &[],
+            engines: &[],
             brdf: &*read_brdf(BRDF)?,
             precision: Precision::Half,
             filtering: false,

@@ -25,7 +25,7 @@ pub(super) struct Gltf {
     /// Model: `.glb`, or `.gltf` with its files
     #[arg(value_name = "MODEL")]
     model: PathBuf,
-    /// The model to write, in the form of the input; for `--for files` a folder
+    /// The model to write, in the form of the input, or a `.gltf` as one `.glb`; for `--for files` a folder
     #[arg(short, long, value_name = "FILE|FOLDER", required_unless_present = "dry_run")]
     output: Option<PathBuf>,
     /// Readers of the model: `web` (KTX2 by KHR_texture_basisu, with a PNG for the others), `bevy` (KTX2
@@ -56,7 +56,11 @@ enum Readers {
 
 impl Gltf {
     pub(super) fn run(self, json: bool) -> Result<(), Error> {
-        let asset = Asset::read(&self.model)?;
+        let mut asset = Asset::read(&self.model)?;
+        let is = |path: &Path, form: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(form));
+        if self.readers != Readers::Files && self.output.as_deref().is_some_and(|out| is(out, "glb")) {
+            asset = asset.packed()?;
+        }
         if let Some(report) = &self.report {
             check_apart([Some(report), Some(&self.model), self.output.as_ref()].into_iter().flatten())?;
             make_way(report)?;
@@ -114,7 +118,7 @@ impl Gltf {
                 make_way(output)
             }
             (true, _) => refuse("a .glb is written as a .glb"),
-            (false, _) => refuse("a .gltf is written as a .gltf, with its files beside it"),
+            (false, _) => refuse("a .gltf is written as a .gltf with its files beside it, or as one .glb"),
         }
     }
 

@@ -89,6 +89,9 @@ pub(super) struct Render {
     /// Where the camera is and looks: EX,EY,EZ,TX,TY,TZ and perhaps its angle of view in degrees
     #[arg(long, value_name = "NUMBERS", value_parser = camera, allow_hyphen_values = true)]
     camera: Option<CameraSpec>,
+    /// Factor on the camera's distance from what it looks at: 4 makes things a quarter as large
+    #[arg(long, value_name = "FACTOR", value_parser = positive)]
+    distance: Option<f64>,
     /// A light in place of the scene's: the direction to it X,Y,Z, or `point:X,Y,Z`, and perhaps :R,G,B. May
     /// be repeated
     #[arg(long, value_name = "LIGHT", value_parser = light, allow_hyphen_values = true)]
@@ -480,6 +483,7 @@ impl Render {
             lobe: self.brdf.as_deref().map(read_brdf).transpose()?,
             shading: self.model,
             camera: self.camera,
+            distance: self.distance,
             lights: self.light.clone(),
             diffuse: self.diffuse,
             specular: self.specular,
@@ -530,6 +534,7 @@ impl Render {
             "files": written,
             "method": report.methods[0],
             "device": device["device"],
+            "cameras": report.frames.iter().map(|f| tables::numbers_of(&f.camera)).collect::<Vec<_>>(),
             "width": self.size.width,
             "height": self.size.height,
             "seconds": seconds,

@@ -51,8 +51,8 @@ pub(super) struct Roughness {
     /// For `.png`: this level alone, under the name as it is
     #[arg(long, value_name = "N")]
     level: Option<usize>,
-    /// For `.ktx2`: `uastc`, the format of glTF's `KHR_texture_basisu`, or `rgba8`, four bytes a texel
-    /// [default: uastc]
+    /// For `.ktx2`: `uastc`, the format of glTF's `KHR_texture_basisu`; for desktop cards `bc7` or, for one
+    /// channel, `bc4`; or `rgba8`, four bytes a texel [default: uastc]
     #[arg(long, value_parser = TextureEncoding::from_str)]
     encoding: Option<TextureEncoding>,
     /// For `.ktx2`: level of Zstandard, from 1 (fast) to 22; 0 writes it plain [default: 3]
@@ -149,6 +149,9 @@ impl Roughness {
                 refuse("a PNG has neither `--encoding` nor `--zstd`".to_owned())
             }
             Some("png") => Ok(true),
+            _ if self.encoding == Some(TextureEncoding::Bc4) && self.packing == Packing::Orm => {
+                refuse("bc4 holds one channel, and `--packing orm` writes three".to_owned())
+            }
             Some("ktx2") if self.level.is_some() => {
                 refuse("a KTX2 holds all levels; `--level` is for a PNG".to_owned())
             }
@@ -203,13 +206,18 @@ impl Roughness {
             ));
         }
         let has_alpha = channel == 3 || values.texels().iter().any(|texel| texel[3] != 1.0);
-        let is_uastc = self.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("ktx2"))
-            && self.encoding.unwrap_or_default() == TextureEncoding::Uastc;
-        if keeps_others && has_alpha && is_uastc {
+        let encoding = self.encoding.unwrap_or_default();
+        let is_packed = self.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("ktx2"))
+            && encoding != TextureEncoding::Rgba8;
+        if keeps_others && has_alpha && is_packed {
             return Err(Error::Request(format!(
-                "{}: has an alpha channel, which is not written as UASTC: add `--encoding rgba8`",
+                "{}: has an alpha channel, which is not written as {encoding}: add `--encoding rgba8`",
                 path.display()
             )));
+        }
+        if keeps_others && encoding == TextureEncoding::Bc4 {
+            let why = "keeps its other channels, and bc4 holds one: add `--encoding bc7`";
+            return Err(Error::Request(format!("{}: {why}", path.display())));
         }
         Ok(Given { values, channel, keeps_others })
     }

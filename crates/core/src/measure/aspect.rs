@@ -11,7 +11,7 @@ use std::f64::consts::SQRT_2;
 use glam::DVec3;
 
 use crate::brdf::{AnyLobe, Lobe, Measured};
-use crate::ndf::{Evaluator, Method};
+use crate::ndf::{Evaluator, Shows};
 
 /// Parts of the measure that lie within the difference angles: solid angle times both cosines squared,
 /// `sin cos⁴` over a mirror.
@@ -168,13 +168,13 @@ pub(super) struct AspectEvaluator<'a> {
 }
 
 impl<'a> AspectEvaluator<'a> {
-    pub(super) fn new(aspects: &'a Aspects<'_>, method: &'a dyn Method, directions: &'a [DVec3]) -> Self {
+    pub(super) fn new(aspects: &'a Aspects<'_>, method: &'a dyn Shows, directions: &'a [DVec3]) -> Self {
         let (evaluators, shown) = match aspects {
-            Aspects::Lobe(lobe) => (vec![method.evaluator(*lobe, directions)], vec![(0, 1.0)]),
+            Aspects::Lobe(lobe) => (vec![method.show(*lobe, directions)], vec![(0, 1.0)]),
             Aspects::Material(material) => {
                 // Three channels are shown at every difference angle, at other scales.
                 let channels = material.shown[..3].iter();
-                let evaluators = channels.map(|(lobe, _)| method.evaluator(&**lobe, directions)).collect();
+                let evaluators = channels.map(|(lobe, _)| method.show(&**lobe, directions)).collect();
                 let scales = material.shown.iter().enumerate().map(|(k, (_, scale))| (k % 3, *scale));
                 (evaluators, scales.collect())
             }

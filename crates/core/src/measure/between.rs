@@ -158,7 +158,7 @@ impl Corners<'_> {
                 let uv = (DVec2::new(x as f64, y as f64) + place) / size;
                 evaluate_neighbours(pyramid, &evaluator, (uv, self.level as f64), &mut out);
                 sums[2].add(&out, &lobe);
-                if method.filterable() {
+                if method.mixes() {
                     channels.fill(0.0);
                     pyramid.bilinear(self.level, uv, 1.0, &mut channels);
                     evaluator.evaluate(&channels, &mut out);

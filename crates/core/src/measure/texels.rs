@@ -14,7 +14,7 @@ use super::aspect::{AspectEvaluator, Aspects, Places, Reflectance};
 use super::estimate::{Draws, Estimate, Sampled, Squares};
 use crate::brdf::Lobe;
 use crate::grid::Size;
-use crate::ndf::{Evaluator, Method};
+use crate::ndf::{Evaluator, Shows};
 use crate::observe::{Cancelled, Observer};
 use crate::pyramid::{Pyramid, footprint, level_sizes};
 use crate::sphere::DiskLattice;
@@ -114,7 +114,7 @@ impl<'a> TexelTruth<'a> {
     }
 
     /// An evaluator of what a method shows in the place of [`Self::texel`].
-    pub fn shown_by<'b>(&'b self, method: &'b dyn Method) -> impl Evaluator + 'b {
+    pub fn shown_by<'b>(&'b self, method: &'b dyn Shows) -> impl Evaluator + 'b {
         AspectEvaluator::new(&self.aspects, method, &self.lattice.directions)
     }
 
@@ -199,8 +199,8 @@ struct Lobes {
 pub struct BakedMap<'a> {
     /// The levels.
     pub pyramid: &'a Pyramid,
-    /// Method that made them.
-    pub method: &'a dyn Method,
+    /// Method that made them, or engine that shades them.
+    pub method: &'a dyn Shows,
 }
 
 /// Texels of a level of `size`, all of them.

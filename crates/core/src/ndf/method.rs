@@ -202,8 +202,30 @@ impl<R: Representation> Evaluator for OneByOne<'_, R> {
     }
 }
 
+/// Reader of texels' channels as effective lobes: a method, or the one lobe of an engine's own material
+/// ([`crate::roughness::EngineLobe`]).
+pub trait Shows: Send + Sync {
+    /// Evaluator of texels for one lobe at fixed directions.
+    fn show<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a>;
+
+    /// True for channels of several texels that may be mixed before they are read.
+    fn mixes(&self) -> bool {
+        true
+    }
+}
+
+impl<R: Representation> Shows for R {
+    fn show<'a>(&'a self, lobe: &'a dyn Lobe, directions: &'a [DVec3]) -> Box<dyn Evaluator + 'a> {
+        Representation::evaluator(self, lobe, directions)
+    }
+
+    fn mixes(&self) -> bool {
+        self.filterable()
+    }
+}
+
 /// A [`Representation`] chosen at run time; [`AnyMethod`] owns one.
-pub trait Method: Describe {
+pub trait Method: Describe + Shows {
     /// The channels of every fine texel of a row: layer after layer, each RGBA texels in order.
     fn accumulate_row(&self, row: &SurfaceRow, channels: &mut [f32]);
 

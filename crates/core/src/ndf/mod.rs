@@ -40,7 +40,7 @@ pub use fixed::Fixed;
 pub use form::{Form, FormKind};
 pub use gmm::{GaussianMixture, Gmm};
 pub use leadr::{MirroredFacet, SlopeGrid};
-pub use method::{AnyMethod, Describe, Evaluator, FlatLobe, Method, Representation, Sample};
+pub use method::{AnyMethod, Describe, Evaluator, FlatLobe, Method, Representation, Sample, Shows};
 pub use mixture::{LobeSums, NormalLobe, Response, SERIES_ORDER};
 pub use naive::Naive;
 pub use ndm::{Ndm, NdmFactors, NdmKernel, NdmNormalisation};

@@ -8,6 +8,7 @@
 
 mod engine;
 mod fit;
+mod lobe;
 mod mips;
 mod profile;
 mod rules;
@@ -21,6 +22,7 @@ use crate::surface::{Surface, SurfaceRow, unit_or_up};
 
 pub use engine::{EngineMaterial, LEAST_ROUGHNESS};
 pub use fit::Objective;
+pub use lobe::EngineLobe;
 pub use mips::{enlarged, mips};
 pub use rules::{PLAIN, Reads, Row, Spread, TABLE, find};
 

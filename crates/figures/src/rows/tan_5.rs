@@ -31,6 +31,7 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
         lobe: &*lobe,
         methods: &methods(&METHODS),
         baked: &[],
+        engines: &[],
         precision: Precision::Half,
         filtering: true,
     };

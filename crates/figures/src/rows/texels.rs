@@ -53,6 +53,7 @@ pub(crate) fn compared(
         lobe: &*lobe(brdf),
         methods: &methods(spellings),
         baked: &[],
+        engines: &[],
         precision: Precision::Half,
         filtering: false,
     };

@@ -9,6 +9,7 @@ mod container;
 mod document;
 mod edit;
 mod layers;
+mod pack;
 mod reprint;
 
 use std::path::{Path, PathBuf};

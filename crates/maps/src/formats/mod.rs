@@ -6,6 +6,7 @@
 
 #[cfg(feature = "basis")]
 mod basis;
+mod blocks;
 mod dds;
 mod decoded;
 pub mod exr;

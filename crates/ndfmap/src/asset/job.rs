@@ -8,7 +8,7 @@ use ndfmap_core::roughness::{EngineMaterial, PLAIN, RoughSurface, Widening};
 use ndfmap_core::surface::{Surface, unit_or_up};
 use ndfmap_maps::MapError;
 use ndfmap_maps::asset::{Appearance, Asset, Layer, MaterialLayer, MaterialPair, Pair, Reason};
-use ndfmap_maps::formats::ktx2::{Blocks, Texture};
+use ndfmap_maps::formats::ktx2::{Texture, Transcoded};
 
 use super::{
     AssetFix, AssetJob, AssetReport, Gain, LEAST_GAIN, LayerReport, LayerViews, NewTexture, Outcome,
@@ -153,14 +153,14 @@ impl AssetJob<'_> {
             return Ok(Errors { relative_l2: 1.0, flip: 1.0 });
         }
         let filtered = Texture { levels: texture.levels[1..].to_vec(), importance: texture.importance };
-        let roughness = |blocks: Blocks| -> Result<Vec<Grid<f32>>, Error> {
+        let roughness = |blocks: Transcoded| -> Result<Vec<Grid<f32>>, Error> {
             let levels = filtered.transcoded(self.asset.path(), blocks)?;
             let green = |level: &Grid<[u8; 4]>| {
                 Grid::from_fn(level.size(), |x, y| f32::from(level.row(y)[x][1]) / 255.0)
             };
             Ok(std::iter::once(stock[0].clone()).chain(levels.iter().map(green)).collect())
         };
-        let (astc, bc7) = (roughness(Blocks::Astc)?, roughness(Blocks::Bc7)?);
+        let (astc, bc7) = (roughness(Transcoded::Astc)?, roughness(Transcoded::Bc7)?);
         let judged = judge.errors(&[stock, &astc, &bc7], observer)?;
         let of_stock = |i: usize| {
             mean_ratios(judged.iter().map(|level| (mean(&level.candidates[i]), mean(&level.candidates[0]))))

@@ -115,6 +115,26 @@ impl FromStr for Origin {
     }
 }
 
+impl Origin {
+    /// Perceptual roughness of every level of a surface, finest first.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the observer wants it to end.
+    pub fn levels(
+        self,
+        surface: &RoughSurface,
+        observer: &dyn Observer,
+    ) -> Result<Vec<Grid<f32>>, Cancelled> {
+        match self {
+            Self::Rule(name) => surface.bake(Widening::Rule(find(name).unwrap_or(&PLAIN)), observer),
+            Self::Fit(Fit { objective, share }) => {
+                let plain = surface.bake(Widening::Rule(&PLAIN), observer)?;
+                Ok(partly(&plain, &surface.bake(Widening::Fit(objective), observer)?, share))
+            }
+        }
+    }
+}
+
 impl Serialize for Origin {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
@@ -189,11 +209,7 @@ impl RoughnessJob<'_> {
             |row: &'static Row| Ok((Origin::Rule(row.name), surface.bake(Widening::Rule(row), observer)?));
         let mut made = vec![by(&PLAIN)?];
         match self.by {
-            Some(Origin::Rule(name)) => made.push(by(find(name).unwrap_or(&PLAIN))?),
-            Some(Origin::Fit(fit)) => {
-                let levels = surface.bake(Widening::Fit(fit.objective), &observer.part(0.0, 0.5))?;
-                made.push((Origin::Fit(fit), partly(&made[0].1, &levels, fit.share)));
-            }
+            Some(origin) => made.push((origin, origin.levels(surface, &observer.part(0.0, 0.5))?)),
             None => {
                 // Several shares of a fit need it once.
                 let mut whole: Option<(Objective, Vec<Grid<f32>>)> = None;

@@ -21,7 +21,7 @@ use ndfmap_core::pyramid::{Layout, Precision, level_sizes};
 
 pub(super) use self::container::Container;
 #[cfg(feature = "basis")]
-pub use self::texture::Blocks;
+pub use self::texture::Transcoded;
 pub use self::texture::{Texture, TextureEncoding};
 use super::{ChannelLayout, Format, NdfSink, WriteOptions};
 use crate::atomic::AtomicFile;
