@@ -20,9 +20,9 @@ use ndfmap_core::grid::Size;
 use ndfmap_core::pyramid::{Layout, Precision, level_sizes};
 
 pub(super) use self::container::Container;
-#[cfg(feature = "basis")]
-pub use self::texture::Transcoded;
 pub use self::texture::{Texture, TextureEncoding};
+#[cfg(feature = "basis")]
+pub use self::texture::{Transcoded, transcode};
 use super::{ChannelLayout, Format, NdfSink, WriteOptions};
 use crate::atomic::AtomicFile;
 use crate::ndf_map::layout_of;

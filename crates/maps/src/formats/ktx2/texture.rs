@@ -5,6 +5,8 @@ use std::path::Path;
 use ::ktx2::dfd::{Basic, Block};
 use ::ktx2::{Format as VkFormat, SupercompressionScheme};
 use ndfmap_core::grid::Grid;
+#[cfg(feature = "basis")]
+use ndfmap_core::grid::Size;
 use ndfmap_core::words;
 use rayon::prelude::*;
 
@@ -172,27 +174,9 @@ impl Texture {
     /// [`MapError`] when a level cannot be packed.
     #[cfg(feature = "basis")]
     pub fn transcoded(&self, path: &Path, blocks: Transcoded) -> Result<Vec<Grid<[u8; 4]>>, MapError> {
-        use basisu::{DecodeFlags, TargetFormat, Transcoder};
-        let failed = |e: basisu::Error| MapError::invalid(path, format!("cannot be transcoded: {e:?}"));
-        let bytes = self.to_ktx2(path, TextureEncoding::Uastc, None)?;
-        let transcoder = Transcoder::new(&bytes).map_err(failed)?;
-        let target = match blocks {
-            // Its decoder is exact, and UASTC a part of it.
-            Transcoded::Astc => TargetFormat::Rgba32,
-            Transcoded::Bc7 => TargetFormat::Bc7Rgba,
-        };
-        let level = |(i, level): (usize, &Grid<[u8; 4]>)| {
-            let decoded = transcoder.transcode(i as u32, target, DecodeFlags::NONE).map_err(failed)?;
-            let texels = match blocks {
-                Transcoded::Astc => decoded.as_chunks().0.to_vec(),
-                Transcoded::Bc7 => of_bc7(&decoded, level.size()),
-            };
-            Grid::from_vec(level.size(), texels)
-                .ok_or_else(|| MapError::invalid(path, "was transcoded to another size"))
-        };
-        self.levels.iter().enumerate().map(level).collect()
+        let sizes: Vec<Size> = self.levels.iter().map(Grid::size).collect();
+        transcode(path, &self.to_ktx2(path, TextureEncoding::Uastc, None)?, &sizes, blocks)
     }
-
     fn content(
         &self,
         path: &Path,
@@ -238,9 +222,40 @@ pub enum Transcoded {
     Bc7,
 }
 
+/// Texels of the levels of these sizes of a file of Basis Universal, as a graphics card reads them after it
+/// became the card's own blocks; the path is for messages.
+///
+/// # Errors
+/// [`MapError`] for a file that cannot be read so.
+#[cfg(feature = "basis")]
+pub fn transcode(
+    path: &Path,
+    ktx2: &[u8],
+    sizes: &[Size],
+    blocks: Transcoded,
+) -> Result<Vec<Grid<[u8; 4]>>, MapError> {
+    use basisu::{DecodeFlags, TargetFormat, Transcoder};
+    let failed = |e: basisu::Error| MapError::invalid(path, format!("cannot be transcoded: {e:?}"));
+    let transcoder = Transcoder::new(ktx2).map_err(failed)?;
+    let target = match blocks {
+        // Its decoder is exact, and UASTC a part of it.
+        Transcoded::Astc => TargetFormat::Rgba32,
+        Transcoded::Bc7 => TargetFormat::Bc7Rgba,
+    };
+    let level = |(i, size): (usize, &Size)| {
+        let decoded = transcoder.transcode(i as u32, target, DecodeFlags::NONE).map_err(failed)?;
+        let texels = match blocks {
+            Transcoded::Astc => decoded.as_chunks().0.to_vec(),
+            Transcoded::Bc7 => of_bc7(&decoded, *size),
+        };
+        Grid::from_vec(*size, texels).ok_or_else(|| MapError::invalid(path, "was transcoded to another size"))
+    };
+    sizes.iter().enumerate().map(level).collect()
+}
+
 /// Texels of BC7 blocks.
 #[cfg(feature = "basis")]
-fn of_bc7(blocks: &[u8], size: ndfmap_core::grid::Size) -> Vec<[u8; 4]> {
+fn of_bc7(blocks: &[u8], size: Size) -> Vec<[u8; 4]> {
     let mut texels = vec![[0; 4]; size.area()];
     let across = size.width.div_ceil(4);
     for (i, block) in blocks.chunks(16).enumerate() {
@@ -258,8 +273,6 @@ fn of_bc7(blocks: &[u8], size: ndfmap_core::grid::Size) -> Vec<[u8; 4]> {
 
 #[cfg(all(test, feature = "basis"))]
 mod tests {
-    use ndfmap_core::grid::Size;
-
     use super::*;
 
     /// A ramp of three unlike channels, with some noise by a linear congruence.
