@@ -11,7 +11,7 @@ use ndfmap_core::bake::{Bake, BakeError, MemorySink};
 use ndfmap_core::brdf::AnyLobe;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::measure::{BakedMap, FilteringError, TexelTruth, filtering_errors, lattice_for};
-use ndfmap_core::ndf::AnyMethod;
+use ndfmap_core::ndf::{AnyMethod, Shows};
 use ndfmap_core::observe::Cancelled;
 use ndfmap_core::surface::{NormalGrid, Surface, SurfaceRow};
 use ndfmap_maps::source::{SourceOptions, read_source};
@@ -119,8 +119,9 @@ fn measure(map: &Path) -> Result<Vec<Vec<Vec<FilteringError>>>, Box<dyn std::err
     let methods = METHODS.map(str::parse::<AnyMethod>).into_iter().collect::<Result<Vec<_>, _>>()?;
     let baked = |method: &AnyMethod| Ok::<_, Cancelled>(Bake::new(&surface, &**method).to_pyramid()?.0);
     let pyramids = methods.iter().map(baked).collect::<Result<Vec<_>, _>>()?;
+    let shown = methods.iter().map(|method| -> &dyn Shows { &**method });
     let map = |(pyramid, method)| BakedMap { pyramid, method };
-    let maps: Vec<BakedMap<'_>> = pyramids.iter().zip(methods.iter().map(|m| &**m)).map(map).collect();
+    let maps: Vec<BakedMap<'_>> = pyramids.iter().zip(shown).map(map).collect();
     let mut all = vec![Vec::new(); METHODS.len()];
     for lobe in LOBES {
         let lobe = lobe.parse::<AnyLobe>()?;
