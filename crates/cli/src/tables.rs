@@ -121,6 +121,7 @@ pub(crate) fn comparison(comparison: &Comparison) -> String {
     text.push('\n');
     for row in rows {
         text += &format!("{:name$} {:>6} {:>8.1}", row.method, row.bytes_per_texel, row.bake_seconds * 1e3);
+        text += &"      -".repeat(row.from_level);
         for level in &row.levels {
             text += &format!(" {:>6}", three_digits(level.error));
         }
@@ -140,7 +141,8 @@ pub(crate) fn comparison(comparison: &Comparison) -> String {
                 ("filtered", (|e| e.filtered.error) as fn(&FilteringError) -> f64),
                 ("reference", |e| e.reference.error),
             ] {
-                text += &format!("{:name$} {what:>15}       -", row.method);
+                text += &format!("{:name$} {what:>15}", row.method);
+                text += &"      -".repeat(row.from_level.max(1));
                 for e in &row.filtering {
                     text += &format!(" {:>6}", three_digits(error(e)));
                 }

@@ -29,6 +29,7 @@
 
 pub mod bake;
 pub mod brdf;
+pub mod compact;
 pub mod fit;
 pub mod grid;
 pub mod light;

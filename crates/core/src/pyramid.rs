@@ -187,6 +187,15 @@ impl Pyramid {
         Self { layers, levels, sizes: self.sizes.clone(), ..*self }
     }
 
+    /// Returns it without levels finer than this one; there may be none left.
+    #[must_use]
+    pub fn from_level(mut self, level: usize) -> Self {
+        let finer = level.min(self.levels.len());
+        self.levels.drain(..finer);
+        self.sizes.drain(..finer);
+        self
+    }
+
     /// Size of the finest level, layers, precision and wraps.
     #[must_use]
     pub fn layout(&self) -> Layout {

@@ -100,7 +100,7 @@ fn measures_that_are_to_stop_stop() {
     let levels: Vec<usize> = (1..level_sizes(surface.size()).len()).collect();
     let method = "toksvig".parse::<AnyMethod>().unwrap();
     let pyramid = Bake::new(&*surface, &*method).to_pyramid().unwrap().0;
-    let maps = [BakedMap { pyramid: &pyramid, method: &*method }];
+    let maps = [BakedMap { pyramid: &pyramid, from_level: 0, method: &*method }];
     for patience in [0, 10] {
         assert_eq!(level_errors(&truth, &maps, &Watch::new(patience)).err(), Some(Cancelled));
         let corners = filtering_errors(&truth, surface.wraps(), &levels, &maps, &Watch::new(patience));

@@ -62,7 +62,7 @@ fn measured(
         methods,
         baked: &[],
         engines: &[],
-        precision: Precision::Half,
+        storage: Precision::Half.into(),
         filtering: true,
     };
     Ok(Some(compare(&subject, &Unobserved)?))

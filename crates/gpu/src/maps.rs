@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex};
 use half::f16;
 use half::slice::HalfFloatSliceExt;
 use ndfmap_core::brdf::{Brdf, SurfaceParams};
+use ndfmap_core::compact::Storage;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::environment::{FilteredEnvironment, Technique};
 use ndfmap_core::lookup::{Lookup, Texels};
@@ -74,13 +75,13 @@ impl Maps {
         device: &Device,
         materials: &[Material],
         method: &AnyMethod,
-        precision: Precision,
+        storage: impl Into<Storage>,
         observer: &dyn Observer,
     ) -> Result<Self, GpuError> {
-        let count = materials.len() as f64;
+        let (count, storage) = (materials.len() as f64, storage.into());
         let one = |(i, material): (usize, &Material)| {
             let part = observer.part(i as f64 / count, (i + 1) as f64 / count);
-            let baked = BakedMaterial::new(material, &**method, precision, &part)?;
+            let baked = BakedMaterial::new(material, &**method, storage, &part)?;
             Textures::new(device, material, &baked)
         };
         let materials = materials.iter().enumerate().map(one).collect::<Result<_, GpuError>>()?;

@@ -8,6 +8,7 @@ use std::path::Path;
 use std::process::Command;
 
 use ndfmap_core::brdf::{AnyLobe, Brdf, ShadingModel};
+use ndfmap_core::compact::{Bits, Compact, Range};
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::{brdf, ndf};
 use ndfmap_gpu::export::{Export, TABLE};
@@ -40,7 +41,11 @@ fn all(language: &str) -> Vec<(String, Vec<u8>)> {
         let lobe = lobes[at % lobes.len()].parse::<AnyLobe>().unwrap();
         let brdf = Brdf { lobe, shading: ShadingModel::ALL[at % ShadingModel::ALL.len()] };
         let method = spelling.parse::<AnyMethod>().unwrap();
-        let export = Export { method: &*method, brdf: &brdf };
+        // Floats, and integers of every number of bits.
+        let ranges = vec![Range { low: -0.25, high: 1.5 }; 4 * method.layers()];
+        let bits = Bits::ALL.get(at % 4).filter(|_| method.filterable());
+        let compact = bits.map(|bits| Compact::new(*bits, ranges, method.encoding()));
+        let export = Export { method: &*method, brdf: &brdf, compact: compact.as_ref() };
         let bytes = export.to(language).unwrap_or_else(|e| panic!("{spelling}: {e}"));
         shaders.push((format!("{at}"), bytes));
     }

@@ -2,13 +2,18 @@
 
 use std::path::Path;
 
+use ndfmap_core::compact::{Bits, Compact, Range};
+use ndfmap_core::ndf::Encoding;
 use ndfmap_core::surface::{Wrap, Wraps};
 use serde::{Deserialize, Serialize};
 
 use crate::MapError;
 
-/// Version of the header that this code writes, and the highest it reads.
+/// Version of headers of maps in floats, all levels of them.
 pub const VERSION: u32 = 1;
+
+/// Version of headers with [`Header::compact`] or [`Header::from_level`], and the highest that is read.
+pub const COMPACT_VERSION: u32 = 2;
 
 /// Description of a normal distribution map, stored in its file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -29,6 +34,50 @@ pub struct Header {
     pub attributes: Vec<Attribute>,
     /// Source that the map was baked from.
     pub source: Source,
+    /// Storage of the channels as integers; `None` for floats.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub compact: Option<Integers>,
+    /// Level of the source that the map's finest is: finer ones are left out.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub from_level: usize,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands fields on by reference")]
+fn is_zero(level: &usize) -> bool {
+    *level == 0
+}
+
+/// Storage of channels as integers, each in a range of its own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Integers {
+    /// Bits of a channel: 8, 10 or 16.
+    pub bits: u32,
+    /// Values of 0 and of the greatest integer, for each channel, four a layer.
+    pub ranges: Vec<[f32; 2]>,
+}
+
+impl Integers {
+    /// Description of a compact form.
+    #[must_use]
+    pub fn of(compact: &Compact) -> Self {
+        let ranges = compact.ranges().iter().map(|Range { low, high }| [*low, *high]).collect();
+        Self { bits: compact.bits().count(), ranges }
+    }
+
+    /// Compact form that it describes, of the channels of an encoding in so many RGBA layers.
+    ///
+    /// # Errors
+    /// [`MapError`] for bits that there are not, and for ranges that are none; `path` is for the message.
+    pub fn compact(&self, path: &Path, encoding: Encoding, layers: usize) -> Result<Compact, MapError> {
+        let bits = Bits::ALL.into_iter().find(|bits| bits.count() == self.bits);
+        let unknown = || MapError::unsupported(path, format!("has channels of {} bits", self.bits));
+        let ranges: Vec<Range> =
+            self.ranges.iter().map(|[low, high]| Range { low: *low, high: *high }).collect();
+        if ranges.len() != 4 * layers || !ranges.iter().all(|range| range.is_sound()) {
+            return Err(MapError::invalid(path, "its header has no sound range for each channel"));
+        }
+        Ok(Compact::new(bits.ok_or_else(unknown)?, ranges, encoding))
+    }
 }
 
 /// Attribute: a map whose values each lobe carries, times its weight.
@@ -102,8 +151,9 @@ impl Header {
     pub fn from_json(path: &Path, text: &str) -> Result<Self, MapError> {
         let header: Self = serde_json::from_str(text)
             .map_err(|e| MapError::invalid(path, format!("its `ndfmap` key cannot be read: {e}")))?;
-        if header.version > VERSION {
-            let reason = format!("has header version {}; this program reads up to {VERSION}", header.version);
+        if header.version > COMPACT_VERSION {
+            let reason =
+                format!("has header version {}; this program reads up to {COMPACT_VERSION}", header.version);
             return Err(MapError::unsupported(path, reason));
         }
         Ok(header)

@@ -21,6 +21,6 @@ pub mod source;
 
 pub use error::MapError;
 pub use formats::{ChannelLayout, WriteOptions};
-pub use header::{Attribute, Header, Source, SourceKind, VERSION};
+pub use header::{Attribute, COMPACT_VERSION, Header, Integers, Source, SourceKind, VERSION};
 pub use image::{Image, MAX_SIDE, MAX_TEXELS, Samples};
 pub use ndf_map::{MAX_ATTRIBUTES, NdfMap, NdfTexel};

@@ -4,11 +4,12 @@ use std::path::Path;
 
 use glam::DVec3;
 use ndfmap_core::brdf::{Brdf, SurfaceParams};
+use ndfmap_core::compact::Compact;
 use ndfmap_core::lookup::{Filtering, PixelFootprint, Texels};
 use ndfmap_core::ndf::{AnyMethod, Decoded, FilteredTexel, IncidentLight, Method};
 use ndfmap_core::pyramid::{Layout, Precision, Pyramid};
 
-use crate::formats::{WriteOptions, read_file, read_ndf, to_write};
+use crate::formats::{WriteOptions, check_integers, read_file, read_ndf, to_write};
 use crate::image::check_size;
 use crate::{Header, MapError};
 
@@ -37,10 +38,26 @@ impl NdfMap {
     /// # Errors
     /// [`MapError`] for a name or options that no format has, and for a file that cannot be written.
     pub fn save(&self, path: &Path, options: &WriteOptions) -> Result<u64, MapError> {
-        match to_write(path)?.write_ndf {
+        let format = to_write(path)?;
+        check_integers(path, format, options)?;
+        if options.compact.is_none() && self.header.compact.is_some() {
+            // Floats have no ranges.
+            let header = Header { compact: None, ..self.header.clone() };
+            return Self { header, pyramid: self.pyramid.clone() }.save(path, options);
+        }
+        match format.write_ndf {
             Some(write) => write(path, self, options),
             None => unreachable!("formats to write have a writer"),
         }
+    }
+
+    /// Form of the map's integers, as its file holds them; `None` for floats.
+    ///
+    /// # Errors
+    /// [`MapError`] for a header that does not fit the map; `path` is for the message.
+    pub fn compact(&self, path: &Path) -> Result<Option<Compact>, MapError> {
+        let own = self.header.compact.as_ref();
+        own.map(|own| own.compact(path, self.method(path)?.encoding(), self.pyramid.layers())).transpose()
     }
 
     /// Method that decodes the map.
@@ -146,7 +163,7 @@ impl NdfTexel {
 /// Attributes that a map may carry.
 pub const MAX_ATTRIBUTES: usize = 15;
 
-fn method_of(path: &Path, header: &Header) -> Result<AnyMethod, MapError> {
+pub(crate) fn method_of(path: &Path, header: &Header) -> Result<AnyMethod, MapError> {
     header.method.parse::<AnyMethod>().map_err(|e| MapError::unsupported(path, e))
 }
 

@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop where it is")]
 
 mod common;
+#[path = "formats/compact.rs"]
+mod compact;
 
 use std::path::Path;
 
@@ -238,7 +240,7 @@ fn attributes_that_do_not_fit_the_method_are_refused() {
 
 /// OpenImageIO's channels, in the map's own precision.
 const BUMPSLOPES: WriteOptions =
-    WriteOptions { zstd: None, channels: ChannelLayout::Bumpslopes, precision: None };
+    WriteOptions { zstd: None, channels: ChannelLayout::Bumpslopes, precision: None, compact: None };
 
 #[test]
 fn options_that_a_format_has_not_are_refused() {

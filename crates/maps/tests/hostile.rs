@@ -9,6 +9,7 @@ mod common;
 use std::path::Path;
 
 use common::{baked, pictures};
+use ndfmap_core::compact::Bits;
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::pyramid::Precision;
 use ndfmap_maps::formats::{read_image, read_ndf, to_write};
@@ -32,6 +33,9 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
     let compressed = WriteOptions { zstd: Some(3), ..WriteOptions::default() };
     baked("vmf:2", "armour", Precision::Half).save(&path, &compressed).unwrap();
     all.push(("zstd.ktx2", std::fs::read(&path).unwrap()));
+    let compact = WriteOptions { compact: Some(Bits::Ten), ..WriteOptions::default() };
+    baked("vmf:2", "armour", Precision::Single).save(&path, &compact).unwrap();
+    all.push(("compact.ktx2", std::fs::read(&path).unwrap()));
     all
 }
 
@@ -188,7 +192,7 @@ fn headers_that_contradict_their_file_are_refused() {
     assert!(replaced("\"slopes\"", "\"vfm:99\"").contains("there is no method called `vfm`"));
     assert!(
         replaced("\"version\":1", "\"version\":7")
-            .contains("has header version 7; this program reads up to 1")
+            .contains("has header version 7; this program reads up to 2")
     );
     assert!(replaced("\"slopes\"", "\"sh:016\"").contains("layer count of 2"));
     assert!(replaced("\"width\":21", "\"width\":99").contains("has a width of 21"));

@@ -55,7 +55,7 @@ fn error(spelling: &str) -> Result<f64, Box<dyn std::error::Error>> {
     let truth = TexelTruth::new(&*surface, &*lobe, &lattice);
     let method = spelling.parse::<AnyMethod>()?;
     let pyramid = Bake::new(&*surface, &*method).to_pyramid()?.0;
-    let map = BakedMap { pyramid: &pyramid, method: &*method };
+    let map = BakedMap { pyramid: &pyramid, from_level: 0, method: &*method };
     Ok(level_errors(&truth, &[map], &|_| ())?.maps[0][4].error)
 }
 

@@ -120,7 +120,7 @@ fn measure(map: &Path) -> Result<Vec<Vec<Vec<FilteringError>>>, Box<dyn std::err
     let baked = |method: &AnyMethod| Ok::<_, Cancelled>(Bake::new(&surface, &**method).to_pyramid()?.0);
     let pyramids = methods.iter().map(baked).collect::<Result<Vec<_>, _>>()?;
     let shown = methods.iter().map(|method| -> &dyn Shows { &**method });
-    let map = |(pyramid, method)| BakedMap { pyramid, method };
+    let map = |(pyramid, method)| BakedMap { pyramid, from_level: 0, method };
     let maps: Vec<BakedMap<'_>> = pyramids.iter().zip(shown).map(map).collect();
     let mut all = vec![Vec::new(); METHODS.len()];
     for lobe in LOBES {

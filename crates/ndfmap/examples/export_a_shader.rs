@@ -10,7 +10,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let name = std::env::args().nth(1).unwrap_or_else(|| "glsl-es".to_owned());
     let language = TABLE.iter().find(|row| row.name == name).ok_or("there is no such language")?;
     let brdf = Brdf::new(Ggx::new(Alpha::new(0.2)?), ShadingModel::Smith);
-    let bytes = Export { method: &Vmf::new(4)?, brdf: &brdf }.to(language)?;
+    let bytes = Export { method: &Vmf::new(4)?, brdf: &brdf, compact: None }.to(language)?;
     println!("{}", String::from_utf8_lossy(&bytes));
     Ok(())
 }

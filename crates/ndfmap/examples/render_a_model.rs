@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         times: &[0.0],
         methods: &[Vmf::new(4)?.into()],
         size: Size { width: 320, height: 240 },
-        precision: Precision::Half,
+        storage: Precision::Half.into(),
         lookups: Lookups::taps(Filtering::fine(16)),
         truth: None,
         sparkle: false,

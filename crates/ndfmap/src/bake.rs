@@ -3,16 +3,19 @@
 use std::path::Path;
 use std::time::Instant;
 
-use ndfmap_core::bake::{Bake, BakeReport as Baked};
+use ndfmap_core::bake::{Bake, BakeReport as Baked, LevelSink, Place};
+use ndfmap_core::compact::Storage;
 use ndfmap_core::fit::Rgba;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::ndf::{AnyMethod, Encoding};
 use ndfmap_core::observe::{Observer, Unobserved};
-use ndfmap_core::pyramid::{Precision, level_sizes};
+use ndfmap_core::pyramid::{Layout, Precision, level_sizes};
 use ndfmap_maps::attribute::AttributeMap;
-use ndfmap_maps::formats::to_write;
+use ndfmap_maps::formats::{NdfSink, check_integers, to_write};
 use ndfmap_maps::source::SourceMap;
-use ndfmap_maps::{ChannelLayout, Header, MAX_ATTRIBUTES, MapError, NdfMap, VERSION, WriteOptions};
+use ndfmap_maps::{
+    COMPACT_VERSION, ChannelLayout, Header, MAX_ATTRIBUTES, MapError, NdfMap, VERSION, WriteOptions,
+};
 use serde::Serialize;
 
 use crate::Error;
@@ -24,7 +27,8 @@ use crate::choose::Choice;
 pub struct BakeJob<'a> {
     map: &'a SourceMap,
     method: AnyMethod,
-    precision: Precision,
+    storage: Storage,
+    from_level: usize,
     attributes: &'a [AttributeMap],
     observer: &'a dyn Observer,
 }
@@ -71,17 +75,30 @@ pub struct BakeSeconds {
 }
 
 impl<'a> BakeJob<'a> {
-    /// Bake into half floats, without attributes, unobserved.
+    /// Bake into half floats, all levels, without attributes, unobserved.
     #[must_use]
     pub fn new(map: &'a SourceMap, method: impl Into<AnyMethod>) -> Self {
-        let method = method.into();
-        Self { map, method, precision: Precision::Half, attributes: &[], observer: &Unobserved }
+        let (method, storage) = (method.into(), Storage::default());
+        Self { map, method, storage, from_level: 0, attributes: &[], observer: &Unobserved }
     }
 
-    /// Returns it with channels of this precision.
+    /// Returns it with channels stored so.
     #[must_use]
-    pub fn precision(self, precision: Precision) -> Self {
-        Self { precision, ..self }
+    pub fn storage(self, storage: impl Into<Storage>) -> Self {
+        Self { storage: storage.into(), ..self }
+    }
+
+    /// Returns it without levels finer than this one. Level 0 is a normal map itself, which a renderer has.
+    #[must_use]
+    pub fn from_level(self, from_level: usize) -> Self {
+        Self { from_level, ..self }
+    }
+
+    /// Sizes of the levels that are kept, finest first.
+    fn sizes(&self) -> Vec<Size> {
+        let mut sizes = level_sizes(self.map.surface.size());
+        sizes.drain(..self.from_level.min(sizes.len()));
+        sizes
     }
 
     /// Returns it with attributes for the lobes to carry.
@@ -99,9 +116,9 @@ impl<'a> BakeJob<'a> {
     /// Header of the baked map.
     #[must_use]
     pub fn header(&self) -> Header {
-        let Size { width, height } = self.map.surface.size();
+        let Size { width, height } = self.sizes().first().copied().unwrap_or(Size { width: 0, height: 0 });
         Header {
-            version: VERSION,
+            version: if self.from_level == 0 { VERSION } else { COMPACT_VERSION },
             method: self.method.to_string(),
             width,
             height,
@@ -109,6 +126,8 @@ impl<'a> BakeJob<'a> {
             encoding: self.method.encoding().name().to_owned(),
             attributes: self.attributes.iter().map(|a| a.attribute.clone()).collect(),
             source: self.map.source.clone(),
+            compact: None,
+            from_level: self.from_level,
         }
     }
 
@@ -121,6 +140,12 @@ impl<'a> BakeJob<'a> {
             return Err(Error::Request(format!("`{}` {why}", self.method)));
         }
         let size = self.map.surface.size();
+        if self.sizes().is_empty() {
+            let levels = level_sizes(size).len();
+            let why =
+                format!("the map has levels 0 to {}: there is none from {}", levels - 1, self.from_level);
+            return Err(Error::Request(why));
+        }
         match self.attributes.iter().find(|a| a.values.size() != size) {
             Some(a) => {
                 let (own, Size { width, height }) = (a.values.size(), size);
@@ -140,7 +165,7 @@ impl<'a> BakeJob<'a> {
     fn begin<'b>(&'b self, values: &'b [Grid<Rgba>]) -> Bake<'b> {
         self.observer.begin(&self.method.to_string());
         Bake::new(&*self.map.surface, &*self.method)
-            .precision(self.precision)
+            .precision(self.storage.baked())
             .attributes(values)
             .observer(self.observer)
     }
@@ -160,6 +185,7 @@ impl<'a> BakeJob<'a> {
         let values = self.values();
         let (pyramid, report) = self.begin(&values).to_pyramid()?;
         refuse_overflow(report, file)?;
+        let pyramid = pyramid.from_level(self.from_level);
         Ok(NdfMap { header: self.header(), pyramid })
     }
 
@@ -180,6 +206,12 @@ impl<'a> BakeJob<'a> {
         if options.zstd.is_some() && exr {
             return Err(Error::Request("Zstandard is for KTX2; an EXR is compressed as it is".to_owned()));
         }
+        let compact = match self.storage {
+            Storage::Float(_) => None,
+            Storage::Compact(bits) => Some(bits),
+        };
+        let options = &WriteOptions { compact, ..*options };
+        check_integers(path, format, options)?;
         let start = Instant::now();
         let (bytes, baked) = match format.open_sink {
             // Rows go straight into a file, so writing counts as baking; what remains is to compress it, if
@@ -187,25 +219,27 @@ impl<'a> BakeJob<'a> {
             Some(open) => {
                 let values = self.values();
                 let bake = self.begin(&values);
-                let mut sink = open(path, &self.header(), bake.layout(), options)?;
+                let layout = Layout { size: self.sizes()[0], ..bake.layout() };
+                let sink = open(path, &self.header(), layout, options)?;
+                let mut sink = FromLevel { sink, from_level: self.from_level };
                 let report = bake.run(&mut sink)?;
                 refuse_overflow(report, path)?;
                 let baked = start.elapsed().as_secs_f64();
-                (sink.finish()?, baked)
+                (sink.sink.finish()?, baked)
             }
             None => {
                 // Bumpslopes of heights change their units, so they are rounded only when written.
                 let converts = bumpslopes && self.map.surface.has_height();
-                let job = if converts { self.clone().precision(Precision::Single) } else { self.clone() };
+                let job = if converts { self.clone().storage(Precision::Single) } else { self.clone() };
                 let map = job.to_map_for(path)?;
                 let baked = start.elapsed().as_secs_f64();
-                let options = WriteOptions { precision: Some(self.precision), ..*options };
+                let options = WriteOptions { precision: Some(self.storage.baked()), ..*options };
                 (map.save(path, &options)?, baked)
             }
         };
-        let size = self.map.surface.size();
+        let sizes = self.sizes();
+        let size = sizes[0];
         let layers = self.method.layers_with(self.attributes.len());
-        let sizes = level_sizes(size);
         let texels: usize = sizes.iter().map(|size| size.area()).sum();
         let suffix = if bumpslopes { "-bumpslopes" } else { "" };
         Ok(BakeReport {
@@ -216,12 +250,29 @@ impl<'a> BakeJob<'a> {
             layers,
             format: format!("{}{suffix}", format.extensions[0]),
             bytes,
-            video_bytes: (texels * layers * self.precision.texel_bytes()) as u64,
+            video_bytes: (texels * self.storage.texel_bytes(layers)) as u64,
             threads: rayon::current_num_threads(),
             seconds: BakeSeconds { read: 0.0, bake: baked, write: start.elapsed().as_secs_f64() - baked },
             warnings: self.map.warnings.clone(),
             auto: None,
         })
+    }
+}
+
+/// Sink that leaves out levels finer than one.
+struct FromLevel {
+    sink: Box<dyn NdfSink>,
+    from_level: usize,
+}
+
+impl LevelSink for FromLevel {
+    type Error = MapError;
+
+    fn write_rows(&mut self, place: Place, bytes: &[u8]) -> Result<(), MapError> {
+        match place.level.checked_sub(self.from_level) {
+            Some(level) => self.sink.write_rows(Place { level, ..place }, bytes),
+            None => Ok(()),
+        }
     }
 }
 

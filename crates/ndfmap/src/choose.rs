@@ -6,9 +6,10 @@
 
 use ndfmap_core::bake::Bake;
 use ndfmap_core::brdf::Lobe;
+use ndfmap_core::compact::Storage;
 use ndfmap_core::measure::{BakedMap, Estimate, FilteringError, TexelTruth, filtering_errors, lattice_for};
 use ndfmap_core::observe::Observer;
-use ndfmap_core::pyramid::{Precision, level_sizes};
+use ndfmap_core::pyramid::level_sizes;
 use ndfmap_core::surface::Surface;
 use serde::Serialize;
 
@@ -50,8 +51,8 @@ pub struct Auto<'a> {
     pub surface: &'a dyn Surface,
     /// Lobe that errors are measured with.
     pub lobe: &'a dyn Lobe,
-    /// Bits of a stored channel.
-    pub precision: Precision,
+    /// Storage of a channel.
+    pub storage: Storage,
     /// Choose only among methods whose lobes carry attributes.
     pub lobes_only: bool,
 }
@@ -95,7 +96,7 @@ impl Auto<'_> {
     /// and [`Error::Cancelled`].
     pub fn choose(&self, limit: Limit, observer: &dyn Observer) -> Result<Choice, Error> {
         // Known before anything is measured.
-        let bytes_of = |method: &AnyMethod| method.layers() * self.precision.texel_bytes();
+        let bytes_of = |method: &AnyMethod| self.storage.texel_bytes(method.layers());
         let mut methods = Vec::new();
         for spelling in CANDIDATES {
             let method = spelling.parse::<AnyMethod>()?;
@@ -121,13 +122,13 @@ impl Auto<'_> {
         let mut pyramids = Vec::new();
         for method in &methods {
             observer.begin(&method.to_string());
-            let bake = Bake::new(self.surface, &**method).precision(self.precision).observer(observer);
-            pyramids.push(bake.to_pyramid()?.0);
+            let bake = Bake::new(self.surface, &**method).precision(self.storage.baked()).observer(observer);
+            pyramids.push(self.storage.stored(bake.to_pyramid()?.0, method.encoding()));
         }
         observer.begin("errors");
         let truth = TexelTruth::new(self.surface, self.lobe, &lattice);
         let shown = methods.iter().map(|method| -> &dyn Shows { &**method });
-        let map = |(pyramid, method)| BakedMap { pyramid, method };
+        let map = |(pyramid, method)| BakedMap { pyramid, from_level: 0, method };
         let maps: Vec<BakedMap<'_>> = pyramids.iter().zip(shown).map(map).collect();
         let errors = filtering_errors(&truth, self.surface.wraps(), &levels, &maps, observer)?;
         let candidate = |(method, errors): (&AnyMethod, &Vec<FilteringError>)| {

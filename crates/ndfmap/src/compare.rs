@@ -6,13 +6,14 @@ use std::time::Instant;
 
 use ndfmap_core::bake::Bake;
 use ndfmap_core::brdf::Lobe;
+use ndfmap_core::compact::{Bits, Storage};
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::measure::{
     BakedMap, Estimate, FilteringError, LevelErrors, TexelTruth, filtering_errors, lattice_for, level_errors,
 };
 use ndfmap_core::ndf::{AnyMethod, Shows};
 use ndfmap_core::observe::Observer;
-use ndfmap_core::pyramid::{Precision, Pyramid, level_sizes};
+use ndfmap_core::pyramid::{Pyramid, level_sizes};
 use ndfmap_core::roughness::{EngineLobe, RoughSurface};
 use ndfmap_core::surface::Surface;
 use ndfmap_core::units::{Alpha, PerceptualRoughness};
@@ -36,8 +37,8 @@ pub struct Subject<'a> {
     pub baked: &'a [BakedFile],
     /// Formulas and fits of one lobe, as engines' own materials shade them: about the mean normal made unit.
     pub engines: &'a [Origin],
-    /// Bits of a stored channel.
-    pub precision: Precision,
+    /// Storage of a channel.
+    pub storage: Storage,
     /// True to measure between texels too.
     pub filtering: bool,
 }
@@ -79,14 +80,17 @@ pub struct Row {
     /// Spelling of the method, name of a baked file, or `rule:` and the name of an engine's formula or a fit.
     #[serde(skip)]
     pub method: String,
-    /// Bytes of a texel of the finest level.
+    /// Bytes of a texel of the finest level that is stored.
     pub bytes_per_texel: usize,
+    /// Level that is the finest of the map; it leaves out finer ones.
+    #[serde(skip)]
+    pub from_level: usize,
     /// Seconds that the bake took.
     pub bake_seconds: f64,
     /// The baked map.
     #[serde(skip)]
     pub pyramid: Pyramid,
-    /// Errors, one a level, finest first.
+    /// Errors, one a level from the finest that is stored on.
     pub levels: Vec<LevelError>,
     /// Errors between texels, where asked for.
     #[serde(skip_serializing_if = "Vec::is_empty", serialize_with = "between_texels")]
@@ -120,9 +124,16 @@ impl LevelError {
     }
 }
 
-/// Errors of every level, finest first.
-fn of_levels(estimates: &[Estimate]) -> Vec<LevelError> {
-    estimates.iter().enumerate().map(|(level, e)| LevelError::of(level, e)).collect()
+/// Errors of every level from one on, finest first.
+fn of_levels(from: usize, estimates: &[Estimate]) -> Vec<LevelError> {
+    estimates.iter().enumerate().map(|(level, e)| LevelError::of(from + level, e)).collect()
+}
+
+/// Storage that a map's file has.
+fn storage_of(map: &NdfMap) -> Storage {
+    let bits = map.header.compact.as_ref().map(|own| own.bits);
+    let compact = Bits::ALL.into_iter().find(|bits_of| Some(bits_of.count()) == bits);
+    compact.map_or(map.pyramid.precision().into(), Storage::Compact)
 }
 
 /// Rows as an object with a key a method.
@@ -162,7 +173,7 @@ pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Compari
     let size = subject.surface.size();
     let sizes = level_sizes(size);
     for BakedFile { path, map } in subject.baked {
-        if map.pyramid.sizes()[0] != size {
+        if sizes.get(map.header.from_level) != Some(&map.pyramid.sizes()[0]) {
             let own = map.pyramid.sizes()[0];
             let reason = format!(
                 "is {} × {}, and {} is {} × {}: it was not baked from it",
@@ -177,7 +188,8 @@ pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Compari
         methods.push(map.method(path)?);
         rows.push(Row {
             method: path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
-            bytes_per_texel: map.pyramid.layers() * map.pyramid.precision().texel_bytes(),
+            bytes_per_texel: storage_of(map).texel_bytes(map.pyramid.layers()),
+            from_level: map.header.from_level,
             bake_seconds: 0.0,
             pyramid: map.pyramid.clone(),
             levels: Vec::new(),
@@ -187,12 +199,14 @@ pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Compari
     for method in subject.methods {
         observer.begin(&method.to_string());
         let start = Instant::now();
-        let bake = Bake::new(subject.surface, &**method).precision(subject.precision).observer(observer);
-        let (pyramid, _) = bake.to_pyramid()?;
+        let bake = Bake::new(subject.surface, &**method).precision(subject.storage.baked());
+        let (pyramid, _) = bake.observer(observer).to_pyramid()?;
+        let pyramid = subject.storage.stored(pyramid, method.encoding());
         methods.push(method.clone());
         rows.push(Row {
             method: method.to_string(),
-            bytes_per_texel: method.layers() * subject.precision.texel_bytes(),
+            bytes_per_texel: subject.storage.texel_bytes(method.layers()),
+            from_level: 0,
             bake_seconds: start.elapsed().as_secs_f64(),
             levels: Vec::new(),
             filtering: Vec::new(),
@@ -203,8 +217,11 @@ pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Compari
     observer.begin("errors");
     let truth = TexelTruth::new(subject.surface, subject.lobe, &lattice);
     let shown = methods.iter().map(|method| -> &dyn Shows { &**method }).chain(repeat(&EngineLobe as _));
-    let maps: Vec<BakedMap<'_>> =
-        rows.iter().zip(shown).map(|(row, method)| BakedMap { pyramid: &row.pyramid, method }).collect();
+    let maps: Vec<BakedMap<'_>> = rows
+        .iter()
+        .zip(shown)
+        .map(|(row, method)| BakedMap { pyramid: &row.pyramid, from_level: row.from_level, method })
+        .collect();
     let part = if subject.filtering { 0.5 } else { 1.0 };
     let LevelErrors { maps: levels, factoring } = level_errors(&truth, &maps, &observer.part(0.0, part))?;
     // Level 0 is the map itself, filtered as maps have always been.
@@ -212,7 +229,7 @@ pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Compari
     let wraps = subject.surface.wraps();
     let filtering = filtering_errors(&truth, wraps, &between, &maps, &observer.part(part, 1.0))?;
     for ((row, levels), filtering) in rows.iter_mut().zip(levels).zip(filtering) {
-        row.levels = of_levels(&levels);
+        row.levels = of_levels(row.from_level, &levels);
         row.filtering = filtering;
     }
     let (map, brdf) = (subject.name.to_owned(), subject.lobe.to_string());
@@ -222,7 +239,7 @@ pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Compari
         height: size.height,
         brdf,
         sizes,
-        factoring: of_levels(&factoring),
+        factoring: of_levels(0, &factoring),
         rows,
     })
 }
@@ -240,7 +257,7 @@ fn engines(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Vec<Row>, E
             "an engine's formula widens the roughness of a highlight, from 0 to 1, which this lobe has not";
         return Err(Error::Request(format!("{lobe}: {why}")));
     };
-    let size = subject.surface.size();
+    let (size, precision) = (subject.surface.size(), subject.storage.baked());
     let roughness = Grid::from_fn(size, |_, _| roughness.get() as f32);
     let surface =
         RoughSurface::new(subject.surface, &roughness).map_err(|e| Error::Request(e.to_string()))?;
@@ -249,10 +266,11 @@ fn engines(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Vec<Row>, E
         observer.begin(&method);
         let start = Instant::now();
         let levels = origin.levels(&surface, observer)?;
-        let pyramid = EngineLobe::map(&surface, &levels, subject.precision, subject.surface.wraps());
+        let pyramid = EngineLobe::map(&surface, &levels, precision, subject.surface.wraps());
         Ok(Row {
             method,
-            bytes_per_texel: subject.precision.texel_bytes(),
+            bytes_per_texel: precision.texel_bytes(),
+            from_level: 0,
             bake_seconds: start.elapsed().as_secs_f64(),
             pyramid: pyramid.unwrap_or_else(|_| unreachable!("roughness of every level of the surface")),
             levels: Vec::new(),

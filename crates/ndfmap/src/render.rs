@@ -2,11 +2,11 @@
 
 use std::time::Instant;
 
+use ndfmap_core::compact::Storage;
 use ndfmap_core::grid::Size;
 use ndfmap_core::lookup::Lookups;
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::observe::Observer;
-use ndfmap_core::pyramid::Precision;
 use ndfmap_scene::metrics::{Picture, change, color_error, flip, relative_l2};
 use ndfmap_scene::{Camera, Effort, Scene};
 use ndfmap_trace::{DRIFT_FRAMES, drifted};
@@ -27,8 +27,8 @@ pub struct RenderJob<'a> {
     pub methods: &'a [AnyMethod],
     /// Size of the pictures.
     pub size: Size,
-    /// Bits of a stored channel.
-    pub precision: Precision,
+    /// Storage of a channel.
+    pub storage: Storage,
     /// Look-ups of the maps.
     pub lookups: Lookups,
     /// Effort of the truth; `None` renders no truth.
@@ -209,7 +209,7 @@ fn render_on<E: Engine>(
     for method in job.methods {
         let start = Instant::now();
         observer.begin(&format!("bake {method}"));
-        baked.push(engine.bake(&first.materials, method, job.precision, observer)?);
+        baked.push(engine.bake(&first.materials, method, job.storage, observer)?);
         bake_seconds.push(start.elapsed().as_secs_f64());
     }
     let mut frames = Vec::new();

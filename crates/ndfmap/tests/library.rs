@@ -32,7 +32,7 @@ fn job<'a>(scene: &'a SceneSpec, methods: &'a [AnyMethod]) -> RenderJob<'a> {
         times: &[0.0],
         methods,
         size: Size { width: 24, height: 24 },
-        precision: Precision::Half,
+        storage: Precision::Half.into(),
         lookups: Lookups::TRILINEAR,
         truth: Some(Effort::rays(32)),
         sparkle: true,
@@ -147,7 +147,7 @@ fn errors_say_how_sure_they_are() {
             methods: &methods,
             baked: &[],
             engines: &[],
-            precision: Precision::Half,
+            storage: Precision::Half.into(),
             filtering: true,
         };
         compare(&subject, &Unobserved)
@@ -190,7 +190,7 @@ fn engines_are_measured_beside_methods() {
             methods: &methods,
             baked: &[],
             engines: &engines,
-            precision: Precision::Single,
+            storage: Precision::Single.into(),
             filtering: true,
         };
         compare(&subject, &Unobserved)

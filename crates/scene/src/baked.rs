@@ -4,11 +4,12 @@
 use glam::DVec3;
 
 use ndfmap_core::bake::Bake;
+use ndfmap_core::compact::Storage;
 use ndfmap_core::fit::Rgba;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::ndf::{AnyMethod, Decoded, Method};
 use ndfmap_core::observe::{Cancelled, Observer};
-use ndfmap_core::pyramid::{Precision, Pyramid};
+use ndfmap_core::pyramid::Pyramid;
 use ndfmap_core::surface::{Surface, SurfaceRow, Wraps};
 
 use super::Material;
@@ -31,19 +32,20 @@ impl BakedMaterial {
     pub fn new(
         material: &Material,
         method: &dyn Method,
-        precision: Precision,
+        storage: Storage,
         observer: &dyn Observer,
     ) -> Result<Self, Cancelled> {
         let maps = material.textures.as_ref().map_or_else(Vec::new, |map| map.grids());
         if let Some(pyramid) = material.map.baked(method) {
             return Ok(Self { pyramid, attributes: 0, params: maps });
         }
-        let bake = Bake::new(&*material.map, method).precision(precision).observer(observer);
+        let bake = Bake::new(&*material.map, method).precision(storage.baked()).observer(observer);
+        let stored = |pyramid: Pyramid| storage.stored(pyramid, method.encoding());
         if method.carries_attributes() {
-            let (pyramid, _) = bake.attributes(&maps).to_pyramid()?;
+            let pyramid = stored(bake.attributes(&maps).to_pyramid()?.0);
             return Ok(Self { pyramid, attributes: maps.len(), params: Vec::new() });
         }
-        Ok(Self { pyramid: bake.to_pyramid()?.0, attributes: 0, params: maps })
+        Ok(Self { pyramid: stored(bake.to_pyramid()?.0), attributes: 0, params: maps })
     }
 }
 

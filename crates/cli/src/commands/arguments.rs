@@ -9,7 +9,6 @@ use ndfmap::core::brdf::{self, AnyLobe, LobeFactors, ParseLobeError};
 use ndfmap::core::grid::Size;
 use ndfmap::core::light::environment::{SceneEnvironment, Technique, builtin};
 use ndfmap::core::ndf::{self, AnyMethod, ParseMethodError};
-use ndfmap::core::pyramid;
 use ndfmap::core::surface::{SlopeFilter, Wrap, Wraps};
 use ndfmap::inspect::{PictureReport, describe_picture};
 use ndfmap::maps::environment::read_environment;
@@ -208,24 +207,9 @@ impl SourceArguments {
     }
 }
 
-/// Bits of a stored channel.
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-pub(super) enum Precision {
-    /// 16-bit floats
-    #[default]
-    Half,
-    /// 32-bit floats
-    Single,
-}
-
-impl std::convert::From<Precision> for pyramid::Precision {
-    fn from(p: Precision) -> Self {
-        match p {
-            Precision::Half => Self::Half,
-            Precision::Single => Self::Single,
-        }
-    }
-}
+/// Help of `--precision`, the storage of a channel.
+pub(super) const STORAGE_HELP: &str = "Storage of a channel: `half` or `single` floats; or integers in the range \
+    that the map's own values fill, `unorm8`, `unorm10` or `unorm16`";
 
 /// Light from everywhere.
 #[derive(Debug, Args)]

@@ -3,10 +3,12 @@
 use std::collections::HashSet;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
+use std::str::FromStr as _;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use ndfmap::choose::{Auto, Choice, Limit};
+use ndfmap::core::compact::Storage;
 use ndfmap::core::ndf::{AnyMethod, DEFAULT_METHOD, Encoding};
 use ndfmap::core::observe::{Observer, Unobserved};
 use ndfmap::maps::attribute::{AttributeMap, Transfer, read_attribute};
@@ -18,7 +20,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::arguments::{
-    BuiltinSize, Precision, STANDARD, SourceArguments, ZSTD, brdf_spelling, method_spelling, methods_help,
+    BuiltinSize, STANDARD, STORAGE_HELP, SourceArguments, ZSTD, brdf_spelling, method_spelling, methods_help,
     positive, read_brdf,
 };
 use super::{make_folder, make_way, print, print_json};
@@ -59,9 +61,11 @@ pub(super) struct Bake {
     /// colours. May be given several times
     #[arg(long, value_name = "[srgb:]FILE", value_parser = attribute_path)]
     attribute: Vec<AttributePath>,
-    /// Bits of a stored channel
-    #[arg(long, value_enum, ignore_case = true, default_value_t = Precision::Half)]
-    precision: Precision,
+    #[arg(long, value_parser = Storage::from_str, default_value_t, help = STORAGE_HELP)]
+    precision: Storage,
+    /// Leave out levels finer than this one: level 0 is the normal map itself, which a renderer has
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    from_level: usize,
     /// Compress a KTX2 with Zstandard, at a level from 1 (fast) to 22; 0 writes it plain [default: 3]
     #[arg(long, value_name = "LEVEL", num_args = 0..=1, require_equals = true, default_missing_value = "3",
         value_parser = clap::value_parser!(i32).range(0..=22))]
@@ -265,7 +269,7 @@ impl Bake {
         let asked = Auto {
             surface: &*map.surface,
             lobe: &*brdf,
-            precision: self.precision.into(),
+            storage: self.precision,
             lobes_only: !self.attribute.is_empty(),
         };
         let choice = asked.choose(limit, observer)?;
@@ -291,7 +295,8 @@ impl Bake {
             return Err(Error::Request(format!("`{method}` {why}")));
         }
         let job = BakeJob::new(&map, method)
-            .precision(self.precision.into())
+            .storage(self.precision)
+            .from_level(self.from_level)
             .attributes(&attributes)
             .observer(observer);
         let channels = match self.layout {

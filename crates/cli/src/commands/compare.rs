@@ -1,15 +1,16 @@
 //! `ndfmap compare`: the error of each method against the truth, level by level.
 
 use std::path::{Path, PathBuf};
+use std::str::FromStr as _;
 use std::sync::Arc;
 
 use clap::Args;
 use ndfmap::compare::{BakedFile, Comparison, Subject, compare};
 use ndfmap::core::brdf::{AnyLobe, Lobe};
+use ndfmap::core::compact::Storage;
 use ndfmap::core::grid::Size;
 use ndfmap::core::lookup::Lookups;
 use ndfmap::core::ndf::AnyMethod;
-use ndfmap::core::pyramid;
 use ndfmap::core::roughness;
 use ndfmap::maps::atomic;
 use ndfmap::maps::formats::{read_file, read_ndf};
@@ -21,7 +22,7 @@ use ndfmap::scene::Effort;
 use ndfmap::{Error, SceneSpec};
 
 use super::arguments::{
-    BuiltinSize, EnvironmentArguments, Precision, SourceArguments, brdf_spelling, brdfs_help,
+    BuiltinSize, EnvironmentArguments, STORAGE_HELP, SourceArguments, brdf_spelling, brdfs_help,
     method_spelling, methods_help, read_brdf, scene_name, size,
 };
 use super::render::{DisplaceArguments, FilterArguments, check_drift};
@@ -54,9 +55,8 @@ pub(super) struct Compare {
     /// The reflectance lobe they are measured with
     #[arg(long, default_value = "blinn-phong:50", value_parser = brdf_spelling)]
     brdf: String,
-    /// Bits of a stored channel; errors are those of the stored map
-    #[arg(long, value_enum, ignore_case = true, default_value_t = Precision::Half)]
-    precision: Precision,
+    #[arg(long, value_parser = Storage::from_str, default_value_t, help = STORAGE_HELP)]
+    precision: Storage,
     /// Also measure between texels, where a filter mixes lobes: filtered, and by shading every neighbour
     #[arg(long)]
     filtering: bool,
@@ -136,7 +136,7 @@ impl Compare {
             baked: &baked,
             engines: &engines,
             brdf: &*brdf,
-            precision: self.precision.into(),
+            storage: self.precision,
             filtering: self.filtering,
             pictures: self.scene.as_ref().map(|scene| Pictures {
                 scene: SceneSpec {
@@ -205,7 +205,7 @@ pub(super) struct Run<'a> {
     pub(super) baked: &'a [BakedFile],
     pub(super) engines: &'a [Origin],
     pub(super) brdf: &'a dyn Lobe,
-    pub(super) precision: pyramid::Precision,
+    pub(super) storage: Storage,
     pub(super) filtering: bool,
     pub(super) pictures: Option<Pictures>,
 }
@@ -243,7 +243,7 @@ impl Run<'_> {
             methods: self.methods,
             baked: self.baked,
             engines: self.engines,
-            precision: self.precision,
+            storage: self.storage,
             filtering: self.filtering,
         };
         let comparison = compare(&subject, terminal)?;
@@ -273,7 +273,7 @@ impl Run<'_> {
             times: &pictures.times,
             methods: self.methods,
             size: pictures.size,
-            precision: self.precision,
+            storage: self.storage,
             lookups: pictures.lookups,
             truth: Some(pictures.truth),
             sparkle: pictures.sparkle,

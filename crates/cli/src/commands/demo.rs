@@ -52,7 +52,7 @@ fn sheet(scene: &str, times: &[f64], terminal: &Terminal) -> Result<Vec<u8>, Err
         times,
         methods: &methods,
         size: Size { width: 224, height: 224 },
-        precision: Precision::Half,
+        storage: Precision::Half.into(),
         lookups: Lookups::taps(Filtering::fine(16)),
         truth: Some(Effort { rays: 128, noise: 0.0, seed: 0 }),
         sparkle: false,
@@ -76,7 +76,7 @@ impl Demo {
             baked: &[],
             engines: &[],
             brdf: &*read_brdf(BRDF)?,
-            precision: Precision::Half,
+            storage: Precision::Half.into(),
             filtering: false,
             pictures: None,
         };

@@ -7,6 +7,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use ndfmap::core::brdf::ShadingModel;
+use ndfmap::core::compact::Storage;
 use ndfmap::core::grid::{Grid, Size};
 use ndfmap::core::light::Light;
 use ndfmap::core::lookup::{Filtering, Lookups, Sampling};
@@ -26,7 +27,7 @@ use ndfmap::{CameraSpec, DisplacementOptions, Error, SceneSpec, scene};
 use serde_json::{Map, Value, json};
 
 use super::arguments::{
-    BuiltinSize, EnvironmentArguments, Precision, SourceArguments, brdf_spelling, brdfs_help,
+    BuiltinSize, EnvironmentArguments, STORAGE_HELP, SourceArguments, brdf_spelling, brdfs_help,
     environments_help, method_spelling, methods_help, positive, read_brdf, scene_name, size,
 };
 use super::{check_apart, check_kept, make_way, print, print_json, say_written, to_value};
@@ -133,9 +134,8 @@ pub(super) struct Render {
     /// The GPU smooths outlines by four samples a pixel, as applications do, in place of 4 x 4 parts
     #[arg(long)]
     multisample: bool,
-    /// Bits of a stored channel
-    #[arg(long, value_enum, ignore_case = true, default_value_t = Precision::Half)]
-    precision: Precision,
+    #[arg(long, value_parser = Storage::from_str, default_value_t, help = STORAGE_HELP)]
+    precision: Storage,
     #[command(flatten)]
     builtin: BuiltinSize,
     #[command(flatten)]
@@ -389,7 +389,7 @@ impl Render {
             times: &times,
             methods: &methods,
             size: self.size,
-            precision: self.precision.into(),
+            storage: self.precision,
             lookups: self.filter.lookups(),
             truth: self.truth.map(|rays| Effort {
                 rays: rays as usize,

@@ -8,19 +8,24 @@ use clap::Args;
 use ndfmap::core::brdf::{Brdf, ShadingModel};
 use ndfmap::core::ndf::{AnyMethod, DEFAULT_METHOD};
 use ndfmap::gpu::export::{Export, Language, TABLE};
+use ndfmap::maps::NdfMap;
 use serde_json::json;
 
 use super::arguments::{STANDARD, brdf_spelling, brdfs_help, method_spelling, methods_help, read_brdf};
 use super::{make_way, print_bytes, print_json, say_written};
+use crate::voice::warn;
 use ndfmap::Error;
 
 /// Write the shader of a method, for other programs
 #[derive(Debug, Args)]
 #[command(after_long_help = format!("{}\n\n{}\n\n{}", languages_help(), methods_help(), brdfs_help()))]
 pub(super) struct Shader {
-    /// The method that the map is baked with
-    #[arg(short, long, default_value = DEFAULT_METHOD, value_parser = method_spelling)]
-    method: String,
+    /// The baked map that the shader is for: its method, and the ranges of its integers
+    #[arg(value_name = "MAP")]
+    map: Option<PathBuf>,
+    #[arg(short, long, value_parser = method_spelling, conflicts_with = "map", help = format!(
+        "The method that the map is baked with [default: {DEFAULT_METHOD}]"))]
+    method: Option<String>,
     /// The reflectance lobe
     #[arg(long, default_value = "ggx:0.2", value_parser = brdf_spelling)]
     brdf: String,
@@ -55,13 +60,26 @@ fn language(text: &str) -> Result<&'static str, String> {
 
 impl Shader {
     pub(super) fn run(self, json: bool) -> Result<(), Error> {
-        let method: AnyMethod = self.method.parse()?;
+        let map = self.map.as_deref().map(NdfMap::open).transpose()?;
+        let method: AnyMethod = match (&map, &self.map) {
+            (Some(map), Some(path)) => map.method(path)?,
+            _ => self.method.as_deref().unwrap_or(DEFAULT_METHOD).parse()?,
+        };
+        let compact = match (&map, &self.map) {
+            (Some(map), Some(path)) => map.compact(path)?,
+            _ => None,
+        };
+        if let (Some(map), Some(path)) = (&map, &self.map)
+            && !map.header.attributes.is_empty()
+        {
+            warn(path, "the attributes that its lobes carry are not used: a place brings its own colours");
+        }
         let lobe = read_brdf(&self.brdf)?;
         let brdf = Brdf { lobe, shading: self.model };
         let output = self.output.as_ref().filter(|path| path.as_os_str() != STANDARD);
         let ending = output.and_then(|path| Some(path.extension()?.to_str()?.to_owned()));
         let language = self.lang.or(ending.as_deref()).and_then(find).unwrap_or(&TABLE[0]);
-        let bytes = Export { method: &*method, brdf: &brdf }.to(language)?;
+        let bytes = Export { method: &*method, brdf: &brdf, compact: compact.as_ref() }.to(language)?;
         if let Some(file) = output {
             make_way(file)?;
             ndfmap::maps::atomic::write(file, &bytes)?;
@@ -78,7 +96,7 @@ impl Shader {
                 "brdf": brdf.lobe.to_string(),
                 "model": self.model.name(),
                 "language": language.name,
-                "layers": method.layers(),
+                "layers": compact.as_ref().map_or(method.layers(), |c| c.bits().layers(method.layers())),
                 "bytes": bytes.len(),
                 "output": self.output,
                 "text": text,

@@ -94,7 +94,12 @@ pub fn filtering_errors(
         } else {
             drawn.estimates()
         };
-        for (errors, [texels, filtered, reference]) in errors.iter_mut().zip(estimates.as_chunks().0) {
+        for ((errors, map), [texels, filtered, reference]) in
+            errors.iter_mut().zip(maps).zip(estimates.as_chunks().0)
+        {
+            if *level < map.from_level {
+                continue;
+            }
             let (texels, filtered, reference) = (*texels, *filtered, *reference);
             errors.push(FilteringError { level: *level, texels, filtered, reference });
         }
@@ -137,7 +142,10 @@ struct Corners<'a> {
 impl Corners<'_> {
     /// Sums of squares of a map: for each figure, of every corner.
     fn squares(&self, truth: &TexelTruth<'_>, map: &BakedMap<'_>) -> [Vec<Squares>; FIGURES] {
-        let BakedMap { pyramid, method } = map;
+        let BakedMap { pyramid, method, from_level } = map;
+        let Some(level) = self.level.checked_sub(*from_level) else {
+            return std::array::from_fn(|_| vec![Squares::default(); self.corners.len()]);
+        };
         let evaluator = truth.shown_by(*method);
         let directions = truth.values();
         let of_corner = |(corner, lobes): (&Corner, &[Vec<f64>; 4])| {
@@ -145,7 +153,7 @@ impl Corners<'_> {
             let mut out = vec![0.0; directions];
             let mut channels = vec![0.0; pyramid.channels()];
             for ((x, y), lobe) in corner.iter().zip(lobes) {
-                evaluator.evaluate(&pyramid.texel(self.level, *x, *y), &mut out);
+                evaluator.evaluate(&pyramid.texel(level, *x, *y), &mut out);
                 sums[0].add(&out, lobe);
             }
             for (meeting, place) in PLACES {
@@ -156,11 +164,11 @@ impl Corners<'_> {
                 let (x, y) = corner[0];
                 let size = DVec2::new(self.size.width as f64, self.size.height as f64);
                 let uv = (DVec2::new(x as f64, y as f64) + place) / size;
-                evaluate_neighbours(pyramid, &evaluator, (uv, self.level as f64), &mut out);
+                evaluate_neighbours(pyramid, &evaluator, (uv, level as f64), &mut out);
                 sums[2].add(&out, &lobe);
                 if method.mixes() {
                     channels.fill(0.0);
-                    pyramid.bilinear(self.level, uv, 1.0, &mut channels);
+                    pyramid.bilinear(level, uv, 1.0, &mut channels);
                     evaluator.evaluate(&channels, &mut out);
                 }
                 sums[1].add(&out, &lobe);
@@ -190,7 +198,7 @@ mod tests {
         let truth = TexelTruth::new(&*surface, &*lobe, &lattice);
         let method = method.parse::<AnyMethod>().unwrap();
         let pyramid = Bake::new(&*surface, &*method).to_pyramid().unwrap().0;
-        let map = BakedMap { pyramid: &pyramid, method: &*method };
+        let map = BakedMap { pyramid: &pyramid, from_level: 0, method: &*method };
         filtering_errors(&truth, surface.wraps(), &[3], &[map], &|_| ()).unwrap()[0][0]
     }
 

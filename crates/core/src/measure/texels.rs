@@ -199,6 +199,8 @@ struct Lobes {
 pub struct BakedMap<'a> {
     /// The levels.
     pub pyramid: &'a Pyramid,
+    /// Level of the surface that the map's finest is; finer ones it leaves out.
+    pub from_level: usize,
     /// Method that made them, or engine that shades them.
     pub method: &'a dyn Shows,
 }
@@ -288,7 +290,7 @@ impl TexelTruth<'_> {
 /// Errors of every level, finest first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LevelErrors {
-    /// Errors of each map.
+    /// Errors of each map, from its own finest level on.
     pub maps: Vec<Vec<Estimate>>,
     /// Share of a measured material's factors in them: the error of the normals as they are, shaded by the
     /// factors. Empty for other lobes.
@@ -344,6 +346,11 @@ pub fn level_errors(
         errors.iter_mut().zip(estimates).for_each(|(errors, estimate)| errors.push(estimate));
         observer.progress((level + 1) as f64 / sizes.len() as f64);
     }
+    // Of levels that a map leaves out there is no error.
+    errors
+        .iter_mut()
+        .zip(maps)
+        .for_each(|(errors, map)| drop(errors.drain(..map.from_level.min(errors.len()))));
     let factoring = if truth.is_measured() { errors.pop().unwrap_or_default() } else { Vec::new() };
     Ok(LevelErrors { maps: errors, factoring })
 }
@@ -387,10 +394,13 @@ fn squares(
     texels: &[(usize, usize)],
     lobes: &[Vec<f64>],
 ) -> Vec<Squares> {
+    let Some(own_level) = level.checked_sub(map.from_level) else {
+        return vec![Squares::default(); texels.len()];
+    };
     let evaluator = truth.shown_by(map.method);
     let of = |((x, y), lobe): (&(usize, usize), &Vec<f64>)| {
         let mut approx = vec![0.0; lobe.len()];
-        evaluator.evaluate(&map.pyramid.texel(level, *x, *y), &mut approx);
+        evaluator.evaluate(&map.pyramid.texel(own_level, *x, *y), &mut approx);
         let mut sums = Squares::default();
         sums.add(&approx, lobe);
         sums
@@ -451,7 +461,7 @@ mod tests {
         let method = "vmf:1".parse::<crate::ndf::AnyMethod>().unwrap();
         let pyramid = crate::bake::Bake::new(&flat, &*method).to_pyramid().unwrap().0;
         let truth = TexelTruth::new(&flat, &*lobe, &lattice);
-        let maps = [BakedMap { pyramid: &pyramid, method: &*method }];
+        let maps = [BakedMap { pyramid: &pyramid, from_level: 0, method: &*method }];
         for estimate in &level_errors(&truth, &maps, &|_| ()).unwrap().maps[0] {
             assert!(estimate.error < 1e-6 && estimate.standard_error == 0.0, "{estimate:?}");
         }

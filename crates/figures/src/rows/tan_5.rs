@@ -32,7 +32,7 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
         methods: &methods(&METHODS),
         baked: &[],
         engines: &[],
-        precision: Precision::Half,
+        storage: Precision::Half.into(),
         filtering: true,
     };
     let comparison = compare(&subject, plan.observer)?;

@@ -43,7 +43,7 @@ fn draw(plan: &Plan<'_>) -> Result<Drawing, Error> {
             times: &[0.0; 5],
             methods: &methods,
             size: plan.picture(500),
-            precision: Precision::Half,
+            storage: Precision::Half.into(),
             lookups: Lookups::TRILINEAR,
             truth: None,
             sparkle: false,

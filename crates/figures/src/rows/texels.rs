@@ -54,7 +54,7 @@ pub(crate) fn compared(
         methods: &methods(spellings),
         baked: &[],
         engines: &[],
-        precision: Precision::Half,
+        storage: Precision::Half.into(),
         filtering: false,
     };
     compare(&subject, plan.observer)

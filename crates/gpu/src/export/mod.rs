@@ -11,6 +11,7 @@ use std::fmt::Write as _;
 use naga::back;
 use naga::compact::{KeepUnused, compact};
 use ndfmap_core::brdf::Brdf;
+use ndfmap_core::compact::{Bits, Compact};
 use ndfmap_core::ndf::Method;
 use ndfmap_core::shader::{self, LOOKUP};
 use ndfmap_core::units::SlopeVariance;
@@ -113,6 +114,8 @@ pub struct Export<'a> {
     pub method: &'a dyn Method,
     /// Lobe and its shading model.
     pub brdf: &'a Brdf,
+    /// Ranges of the map's integers; `None` for a map in floats.
+    pub compact: Option<&'a Compact>,
 }
 
 impl Export<'_> {
@@ -121,6 +124,10 @@ impl Export<'_> {
     /// # Errors
     /// [`GpuError::Shader`] when the language cannot express the shader.
     pub fn to(&self, language: &Language) -> Result<Vec<u8>, GpuError> {
+        if self.compact.is_some() && !self.method.filterable() {
+            let why = "is read texel by texel, of a map in floats: bake it with `--precision half`";
+            return Err(GpuError::Shader(format!("`{}` {why}", self.method)));
+        }
         let library = self.library();
         // Our own text needs no entry point; naga wants one, to see which functions are used.
         let entry = include_str!("entry.wgsl");
@@ -158,10 +165,12 @@ impl Export<'_> {
         let method = shader::link(self.method, lobe, 0);
         let library = include_str!("library.wgsl");
         let filtered = self.method.filterable();
-        let (lookup, own) = if filtered {
-            ("", include_str!("filtered.wgsl"))
-        } else {
-            (LOOKUP, include_str!("texels.wgsl"))
+        let integers =
+            self.compact.map_or_else(String::new, |compact| channels_of(compact, self.method.layers()));
+        let (lookup, own) = match (filtered, self.compact) {
+            (true, None) => ("", include_str!("filtered.wgsl")),
+            (true, Some(_)) => (&*integers, include_str!("integers.wgsl")),
+            (false, _) => (LOOKUP, include_str!("texels.wgsl")),
         };
         [&method, lookup, &brdf, library, own].join("\n")
     }
@@ -173,12 +182,16 @@ impl Export<'_> {
         } else {
             "any sampler: this method reads texels one by one, of a map that repeats"
         };
-        let (layers, method) = (self.method.layers(), self.method.to_string());
+        let method = self.method.to_string();
+        let (layers, texels) = match self.compact.map(Compact::bits) {
+            None => (self.method.layers(), "half floats"),
+            Some(bits) => (bits.layers(self.method.layers()), texels_of(bits)),
+        };
         let (lobe, shading) = (self.brdf.lobe.to_string(), self.brdf.shading.name());
         format!(
             "Normal distribution map, method {method}, lobe {lobe}, model {shading}. Made by ndfmap {}.\n\
              \n\
-             Bind the map that `ndfmap bake --method {method}` made as a 2-D array texture of {layers} layers, half floats, with all\n\
+             Bind the map that `ndfmap bake --method {method}` made as a 2-D array texture of {layers} layers, {texels}, with all\n\
              its levels and no sRGB decoding, and {sampler}. Then call\n\
              \n    {call}\n\n\
              with uv from 0 to 1 over the map, v down its rows, and a place in the tangent frame (x along u, y against v, z out):\n\
@@ -188,6 +201,42 @@ impl Export<'_> {
             if own_variable { OWN_VARIABLE } else { "" }
         )
     }
+}
+
+/// Kind of the texels of a map in integers, for people who bind it.
+fn texels_of(bits: Bits) -> &'static str {
+    match bits {
+        Bits::Eight => "RGBA8 unorm",
+        Bits::Ten => "RGB10A2 unorm",
+        Bits::Sixteen => "RGBA16 unorm",
+    }
+}
+
+/// Text of the function that takes filtered integers to their ranges, channel by channel.
+fn channels_of(compact: &Compact, layers: usize) -> String {
+    let bits = compact.bits();
+    let stored = bits.layers(layers);
+    let mut text = format!(
+        "// Layers as they are stored. Ranges are affine, so that filtered integers become filtered sums.\n\
+         const STORED_LAYERS = {stored}u;\n\
+         fn ndf_channels(stored: array<vec4<f32>, STORED_LAYERS>) -> Channels {{\n    var channels: Channels;\n"
+    );
+    for layer in 0..layers {
+        let four =
+            |of: &dyn Fn(usize) -> String| (4 * layer..4 * layer + 4).map(of).collect::<Vec<_>>().join(", ");
+        let range = |c: usize| compact.ranges()[c];
+        let low = four(&|c| format!("{:?}", range(c).low));
+        let span = four(&|c| format!("{:?}", range(c).high - range(c).low));
+        let place = four(&|c| {
+            format!("stored[{}].{}", c / bits.channels(), ["x", "y", "z", "w"][c % bits.channels()])
+        });
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "    channels[{layer}] = vec4<f32>({low}) + vec4<f32>({span}) * vec4<f32>({place});"
+        );
+    }
+    text + "    return channels;\n}\n"
 }
 
 /// Returns the module under names that clash with nobody's, without unused parts.
@@ -302,4 +351,47 @@ fn spirv(linked: &Linked) -> Result<Vec<u8>, String> {
     let options = back::spv::Options { lang_version: (1, 3), ..back::spv::Options::default() };
     let words = back::spv::write_vec(&module, &info, &options, None).map_err(|e| e.to_string())?;
     Ok(words.iter().flat_map(|word| word.to_le_bytes()).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use ndfmap_core::compact::Range;
+    use ndfmap_core::ndf::AnyMethod;
+
+    use super::*;
+
+    /// Numbers of a vector in WGSL.
+    fn vector(text: &str) -> Vec<f32> {
+        text.split(", ").map(|number| number.parse().unwrap_or(f32::NAN)).collect()
+    }
+
+    #[test]
+    fn integers_come_to_the_values_that_they_stand_for() {
+        let method = "vmf:3".parse::<AnyMethod>().expect("a method");
+        let layers = method.layers();
+        let range = |c: usize| Range { low: -0.125 * c as f32, high: 0.5 + 0.25 * c as f32 };
+        for bits in Bits::ALL {
+            let compact = Compact::new(bits, (0..4 * layers).map(range).collect(), method.encoding());
+            // What a sampler makes of integers: channel c holds 7 c + 3.
+            let integer = |c: usize| (7 * c + 3) as u16;
+            let unorm = |c: usize| f32::from(integer(c)) / f32::from(bits.most());
+            let text = channels_of(&compact, layers);
+            assert!(text.contains(&format!("STORED_LAYERS = {}u", bits.layers(layers))));
+            let lines = text.lines().filter(|line| line.trim_start().starts_with("channels["));
+            for (layer, line) in lines.enumerate() {
+                let parts: Vec<&str> = line.split("vec4<f32>(").skip(1).collect();
+                let inside = |k: usize| parts[k].split(')').next().unwrap_or_default();
+                let (low, span) = (vector(inside(0)), vector(inside(1)));
+                for (k, place) in inside(2).split(", ").enumerate() {
+                    let (stored, component) = place.split_once("].").expect("stored[i].x");
+                    let stored: usize = stored["stored[".len()..].parse().expect("a layer");
+                    let component = "xyzw".find(component).expect("a component");
+                    let got = low[k] + span[k] * unorm(stored * bits.channels() + component);
+                    let c = 4 * layer + k;
+                    // Single precision, of numbers up to 3.
+                    assert!((got - compact.value(c, integer(c))).abs() < 1e-6, "{bits} {c}: {got}");
+                }
+            }
+        }
+    }
 }

@@ -25,6 +25,7 @@ mod webp;
 use std::path::Path;
 
 use ndfmap_core::bake::LevelSink;
+use ndfmap_core::compact::Bits;
 use ndfmap_core::grid::Size;
 use ndfmap_core::pyramid::{Layout, Precision};
 use ndfmap_core::words;
@@ -85,6 +86,9 @@ pub struct WriteOptions {
     pub zstd: Option<i32>,
     /// Channels of an OpenEXR.
     pub channels: ChannelLayout,
+    /// Bits of channels as integers, each in the range that its values fill, for KTX2; `None` for floats. Maps
+    /// are then baked in single precision.
+    pub compact: Option<Bits>,
     /// Precision of bumpslopes, whose units differ from the map's; `None` for the map's own.
     pub precision: Option<Precision>,
 }
@@ -105,6 +109,8 @@ pub struct Format {
     pub write_ndf: Option<WriteNdf>,
     /// Opens a file to bake into.
     pub open_sink: Option<OpenSink>,
+    /// True where a map's channels may be integers.
+    pub integers: bool,
     /// Writes a rendered picture.
     pub write_picture: Option<WritePicture>,
 }
@@ -120,6 +126,7 @@ impl Format {
             read_ndf: None,
             write_ndf: None,
             open_sink: None,
+            integers: false,
             write_picture: None,
         }
     }
@@ -185,6 +192,20 @@ pub fn to_write(path: &Path) -> Result<&'static Format, MapError> {
         let names: Vec<String> = written().map(|f| format!(".{}", f.extensions[0])).collect();
         MapError::unsupported(path, format!("maps are written as {}", names.join(" or ")))
     })
+}
+
+/// Refuses integers in a format that has none.
+///
+/// # Errors
+/// [`MapError`] that names the file.
+pub fn check_integers(path: &Path, format: &Format, options: &WriteOptions) -> Result<(), MapError> {
+    match options.compact {
+        Some(bits) if !format.integers => {
+            let reason = format!("channels of {bits} are for KTX2; {} holds floats", format.name);
+            Err(MapError::unsupported(path, reason))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Writer of the format that a picture's name asks for by its usual extension.

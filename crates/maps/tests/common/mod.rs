@@ -155,6 +155,8 @@ pub(crate) fn baked_at(size: Size, method: &str, builtin: &str, precision: Preci
         encoding: method.encoding().name().to_owned(),
         attributes: Vec::new(),
         source: map.source,
+        compact: None,
+        from_level: 0,
     };
     NdfMap { header, pyramid: bake.to_pyramid().unwrap().0 }
 }

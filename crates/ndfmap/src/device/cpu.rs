@@ -2,11 +2,11 @@
 
 use std::time::Instant;
 
+use ndfmap_core::compact::Storage;
 use ndfmap_core::grid::Size;
 use ndfmap_core::lookup::Lookups;
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::observe::Observer;
-use ndfmap_core::pyramid::Precision;
 use ndfmap_scene::{Effort, Material, Scene, TruePicture};
 use ndfmap_trace::Geometry;
 use ndfmap_trace::filtered::{BakedMaps, Filtered};
@@ -30,10 +30,10 @@ impl Engine for Cpu {
         &self,
         materials: &[Material],
         method: &AnyMethod,
-        precision: Precision,
+        storage: Storage,
         observer: &dyn Observer,
     ) -> Result<BakedMaps, Error> {
-        Ok(BakedMaps::new(materials, method, precision, observer)?)
+        Ok(BakedMaps::new(materials, method, storage, observer)?)
     }
 
     fn set(&self, scene: &Scene, size: Size) -> Result<Geometry, Error> {

@@ -1,10 +1,10 @@
 //! A GPU renders: `ndfmap-gpu`.
 
+use ndfmap_core::compact::Storage;
 use ndfmap_core::grid::Size;
 use ndfmap_core::lookup::{Lookups, Sampling};
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::observe::Observer;
-use ndfmap_core::pyramid::Precision;
 use ndfmap_gpu::{
     Antialiasing, Canvas, Device, FinestMaps, Frame, Geometry, Maps, Meshes, Renderer, SceneView, TrueFrame,
 };
@@ -52,10 +52,10 @@ impl Engine for Gpu {
         &self,
         materials: &[Material],
         method: &AnyMethod,
-        precision: Precision,
+        storage: Storage,
         observer: &dyn Observer,
     ) -> Result<Maps, Error> {
-        Ok(Maps::new(&self.device, materials, method, precision, observer)?)
+        Ok(Maps::new(&self.device, materials, method, storage, observer)?)
     }
 
     fn set(&self, scene: &Scene, size: Size) -> Result<Geometry, Error> {

@@ -9,11 +9,11 @@ pub(crate) use cpu::Cpu;
 #[cfg(feature = "gpu")]
 pub(crate) use gpu::Gpu;
 
+use ndfmap_core::compact::Storage;
 use ndfmap_core::grid::Size;
 use ndfmap_core::lookup::Lookups;
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::observe::Observer;
-use ndfmap_core::pyramid::Precision;
 use ndfmap_scene::metrics::Picture;
 use ndfmap_scene::{Camera, Effort, Material, Scene, TruePicture};
 use ndfmap_trace::truth::Truth;
@@ -97,7 +97,7 @@ pub(crate) trait Engine {
         &self,
         materials: &[Material],
         method: &AnyMethod,
-        precision: Precision,
+        storage: Storage,
         observer: &dyn Observer,
     ) -> Result<Self::Maps, Error>;
 

@@ -46,7 +46,7 @@ pub fn corner_sheet(subject: &Subject<'_>, comparison: &Comparison) -> Result<Op
     let peak = histogram.iter().copied().fold(1e-12, f64::max);
     let mut drawn = Vec::new();
     for Mixture { row, method, unaligned } in &rows {
-        let bake = Bake::new(subject.surface, &**unaligned).precision(subject.precision);
+        let bake = Bake::new(subject.surface, &**unaligned).precision(subject.storage.baked());
         let (apart, _) = bake.to_pyramid()?;
         let filtered = |pyramid: &Pyramid, method: &dyn Method| {
             let mut out = vec![0.0; lattice.len()];

@@ -136,20 +136,21 @@ fn page(pages: &Pages<'_>, figures: &[Figure]) -> Result<String, Error> {
     environment.add_template(PAGE, include_str!("../../templates/report.html")).map_err(failed)?;
     let comparison = pages.comparison;
     let best: Vec<f64> = (0..comparison.sizes.len())
-        .map(|level| comparison.rows.iter().map(|r| r.levels[level].error).fold(f64::INFINITY, f64::min))
+        .map(|level| {
+            let errors = comparison.rows.iter().flat_map(|row| &row.levels).filter(|e| e.level == level);
+            errors.map(|e| e.error).fold(f64::INFINITY, f64::min)
+        })
         .collect();
     let rows: Vec<minijinja::Value> = comparison
         .rows
         .iter()
         .map(|row| {
-            let cells: Vec<minijinja::Value> = row
-                .levels
-                .iter()
-                .zip(&best)
-                .map(|(LevelError { error, .. }, best)| {
-                    context! { text => three_digits(*error), best => *error <= best * 1.0005 }
-                })
-                .collect();
+            let cell = |LevelError { error, level, .. }: &LevelError| {
+                context! { text => three_digits(*error), best => *error <= best[*level] * 1.0005 }
+            };
+            // A level that a map leaves out has no number.
+            let missing = (0..row.from_level).map(|_| context! { text => "-", best => false });
+            let cells: Vec<minijinja::Value> = missing.chain(row.levels.iter().map(cell)).collect();
             let bake = format!("{:.1}", row.bake_seconds * 1e3);
             context! { method => row.method.clone(), bytes => row.bytes_per_texel, bake => bake, cells => cells }
         })
@@ -161,7 +162,9 @@ fn page(pages: &Pages<'_>, figures: &[Figure]) -> Result<String, Error> {
         .map(|row| {
             let both = |e: &FilteringError| [e.filtered, e.reference].map(|e| three_digits(e.error));
             let cell = |e: &FilteringError| both(e).join(" / ");
-            context! { method => row.method.clone(), cells => row.filtering.iter().map(cell).collect::<Vec<_>>() }
+            // Level 0 has no column.
+            let missing = (1..row.from_level).map(|_| "-".to_owned());
+            context! { method => row.method.clone(), cells => missing.chain(row.filtering.iter().map(cell)).collect::<Vec<_>>() }
         })
         .collect();
     let sizes: Vec<String> = comparison.sizes.iter().map(|s| format!("{}×{}", s.width, s.height)).collect();

@@ -1,12 +1,12 @@
 //! Baked materials: look-ups of their maps' channels and of their surface parameters.
 
 use glam::{DMat2, DVec3};
+use ndfmap_core::compact::Storage;
 use ndfmap_core::lookup::{Lookup, Lookups, PixelFootprint, Texels};
 use ndfmap_core::ndf::{
     AnyMethod, FilteredTexel, IncidentLight, LobeLayout, LocalEnvironment, Method, PreparedBrdf,
 };
 use ndfmap_core::observe::{Cancelled, Observer};
-use ndfmap_core::pyramid::Precision;
 use ndfmap_scene::{BakedMaterial, Material, SurfaceTextures};
 
 /// Baked map of one material. Lights, BRDFs and models come in when shading.
@@ -36,10 +36,10 @@ impl Baked {
     pub(super) fn new(
         material: &Material,
         method: &AnyMethod,
-        precision: Precision,
+        storage: Storage,
         observer: &dyn Observer,
     ) -> Result<Self, Cancelled> {
-        let baked = BakedMaterial::new(material, &**method, precision, observer)?;
+        let baked = BakedMaterial::new(material, &**method, storage, observer)?;
         let wraps = material.map.wraps();
         Ok(Self {
             map: Lookup::new(&baked.pyramid),

@@ -10,13 +10,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use ndfmap_core::brdf::Directions;
+use ndfmap_core::compact::Storage;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::light::environment::SceneEnvironment;
 use ndfmap_core::light::{Light, SplitSum};
 use ndfmap_core::lookup::{Lookups, PixelFootprint};
 use ndfmap_core::ndf::{AnyMethod, IncidentLight, LocalEnvironment, PreparedBrdf};
 use ndfmap_core::observe::{Cancelled, Forward, Observer};
-use ndfmap_core::pyramid::Precision;
 use ndfmap_scene::metrics::Picture;
 use ndfmap_scene::{Camera, Material, Rays, Scene};
 use rayon::prelude::*;
@@ -44,13 +44,13 @@ impl BakedMaps {
     pub fn new(
         materials: &[Material],
         method: &AnyMethod,
-        precision: Precision,
+        storage: impl Into<Storage>,
         observer: &dyn Observer,
     ) -> Result<Self, Cancelled> {
-        let count = materials.len() as f64;
+        let (count, storage) = (materials.len() as f64, storage.into());
         let bake = |(i, material)| {
             let part = observer.part(i as f64 / count, (i + 1) as f64 / count);
-            Baked::new(material, method, precision, &part)
+            Baked::new(material, method, storage, &part)
         };
         let materials = materials.iter().enumerate().map(bake).collect::<Result<_, _>>()?;
         Ok(Self { method: method.clone(), materials })

@@ -342,6 +342,8 @@ fn read_bumpslopes(
                 encoding: "sums".to_owned(),
                 attributes: Vec::new(),
                 source,
+                compact: None,
+                from_level: 0,
             }
         }
     };

@@ -5,6 +5,7 @@
 //! Zstandard needs a level in its order, layer by layer, where a bake makes all layers of a band at once:
 //! rows lie in a plain file without a name until they are compressed. `docs/formats.md` has the layout.
 
+mod compact;
 mod container;
 mod picture;
 mod texture;
@@ -16,16 +17,18 @@ use std::path::Path;
 use ::ktx2::dfd::{Basic, Block};
 use ::ktx2::{Format as VkFormat, Header as KtxHeader, Index, LevelIndex, MAGIC, SupercompressionScheme};
 use ndfmap_core::bake::{LevelSink, Place};
+use ndfmap_core::compact::Compact;
 use ndfmap_core::grid::Size;
 use ndfmap_core::pyramid::{Layout, Precision, level_sizes};
 
+use self::compact::{CompactMap, CompactSink};
 pub(super) use self::container::Container;
 pub use self::texture::{Texture, TextureEncoding};
 #[cfg(feature = "basis")]
 pub use self::texture::{Transcoded, transcode};
 use super::{ChannelLayout, Format, NdfSink, WriteOptions};
 use crate::atomic::AtomicFile;
-use crate::ndf_map::layout_of;
+use crate::ndf_map::{layout_of, method_of};
 use crate::{Header, MapError, NdfMap};
 
 pub(super) const FORMAT: Format = Format {
@@ -35,6 +38,7 @@ pub(super) const FORMAT: Format = Format {
     read_ndf: Some(read_ndf),
     write_ndf: Some(write_ndf),
     open_sink: Some(open_sink),
+    integers: true,
     ..Format::read_by(picture::read)
 };
 
@@ -189,6 +193,9 @@ fn open_sink(
     options: &WriteOptions,
 ) -> Result<Box<dyn NdfSink>, MapError> {
     check_channels(path, options)?;
+    if let Some(bits) = options.compact {
+        return Ok(Box::new(CompactSink::create(path, header, layout, (bits, options))?));
+    }
     Ok(match options.zstd {
         None => Box::new(PlainSink::create(path, header, layout)?),
         Some(zstd) => {
@@ -202,6 +209,11 @@ fn open_sink(
 fn write_ndf(path: &Path, map: &NdfMap, options: &WriteOptions) -> Result<u64, MapError> {
     check_channels(path, options)?;
     let (p, layout) = (&map.pyramid, map.pyramid.layout());
+    if let Some(bits) = options.compact {
+        let compact = Compact::of(bits, p, map.method(path)?.encoding());
+        let written = CompactMap { header: &map.header, layout, compact: &compact, rows: p };
+        return written.write(AtomicFile::create(path)?, options.zstd);
+    }
     if let Some(zstd) = options.zstd {
         let file = CompressedFile::create(path, Content::of_map(path, &map.header, layout)?, zstd)?;
         return file.write(|level| Ok(p.level_bytes(level)));
@@ -380,23 +392,33 @@ fn read_ndf(path: &Path, bytes: &[u8]) -> Result<Option<NdfMap>, MapError> {
     let header = Header::from_json(path, text)?;
     file.is_compressed()?;
     let ktx = &file.header;
-    let precision = match ktx.format {
-        Some(VkFormat::R16G16B16A16_SFLOAT) => Precision::Half,
-        Some(VkFormat::R32G32B32A32_SFLOAT) => Precision::Single,
-        other => {
-            return Err(MapError::unsupported(
-                path,
-                format!("has texels of {other:?}; a baked map is of RGBA16F or RGBA32F"),
-            ));
-        }
-    };
+    let precision =
+        if ktx.format == Some(VkFormat::R16G16B16A16_SFLOAT) { Precision::Half } else { Precision::Single };
     let layout = layout_of(path, &header, precision)?;
+    let encoding = method_of(path, &header)?.encoding();
+    let compact =
+        header.compact.as_ref().map(|own| own.compact(path, encoding, layout.layers)).transpose()?;
+    let due = match &compact {
+        Some(compact) => compact::vk_format(compact.bits()),
+        None => vk_format(precision),
+    };
+    if ktx.format != Some(due) {
+        let reason = match &compact {
+            Some(_) => format!("has texels of {:?}, where its key `{KEY}` says {due:?}", ktx.format),
+            None => format!("has texels of {:?}; a baked map is of RGBA16F or RGBA32F", ktx.format),
+        };
+        return Err(MapError::unsupported(path, reason));
+    }
     let sizes = level_sizes(layout.size);
     let claims = [
         ("width", ktx.pixel_width as usize, layout.size.width),
         ("height", ktx.pixel_height as usize, layout.size.height),
         ("depth", ktx.pixel_depth as usize, 0),
-        ("layer count", ktx.layer_count as usize, layout.layers),
+        (
+            "layer count",
+            ktx.layer_count as usize,
+            compact.as_ref().map_or(layout.layers, |compact| compact.bits().layers(layout.layers)),
+        ),
         ("face count", ktx.face_count as usize, 1),
         ("level count", ktx.level_count as usize, sizes.len()),
     ];
@@ -406,6 +428,12 @@ fn read_ndf(path: &Path, bytes: &[u8]) -> Result<Option<NdfMap>, MapError> {
         }
     }
     let levels = sizes.iter().enumerate();
-    let levels = levels.map(|(level, size)| Ok(file.level(level, level_bytes(&layout, *size))?.into_owned()));
+    let levels = levels.map(|(level, size)| match &compact {
+        None => Ok(file.level(level, level_bytes(&layout, *size))?.into_owned()),
+        Some(form) => {
+            let stored = file.level(level, compact::level_bytes(form.bits(), layout.layers, *size))?;
+            Ok(compact::floats(form, *size, &stored))
+        }
+    });
     NdfMap::assemble(path, header, precision, levels.collect::<Result<_, MapError>>()?).map(Some)
 }
