@@ -17,7 +17,8 @@ const types = {
 // Pages and their packages lie beside this file; what begins with /out/ is the folder of the jobs.
 function place(url) {
   const path = normalize(decodeURIComponent(url.pathname));
-  return path.startsWith('/out/') ? join(resolve(folder), path.slice(5)) : join(here, path);
+  if (path.startsWith('/out/')) return join(resolve(folder), path.slice(5));
+  return path.startsWith('/integrations/') ? join(here, '../..', path) : join(here, path);
 }
 
 const server = createServer((request, answer) => {

@@ -7,11 +7,13 @@ for (const map of maps) {
   for (const object of ['plane', 'sphere']) {
     for (const light of lights) {
       const scene = `${engine}_${map}_${object}_${light}`;
-      const url = (variant) => `/out/${map}_${variant}.glb`;
+      // Lobes are laid on the stock model.
+      const url = (variant) => `/out/${map}_${variant.startsWith('lobes') ? 'stock' : variant}.glb`;
+      const lobes = (variant) => (variant.startsWith('lobes') ? `/out/${map}_${variant}.ktx2` : undefined);
       jobs.push({ name: `${scene}_truth`, url: url('stock'), object, light, truth: true, side: Number(side) });
       for (const anisotropy of filters.map(Number)) {
         for (const variant of variants) {
-          jobs.push({ name: `${scene}_${anisotropy}x_${variant}`, url: url(variant), object, light, anisotropy });
+          jobs.push({ name: `${scene}_${anisotropy}x_${variant}`, url: url(variant), lobes: lobes(variant), object, light, anisotropy });
         }
       }
     }

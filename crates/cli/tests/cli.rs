@@ -7,7 +7,7 @@ mod common;
 use std::path::Path;
 
 use common::{json, outcome, text};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 #[test]
 fn bake_then_inspect_every_method() {
@@ -209,6 +209,58 @@ fn auto_chooses_by_measuring_and_says_why() {
         status == 2 && said.contains("no method takes at most 4 bytes a texel; the least is 8"),
         "{said}"
     );
+}
+
+#[test]
+fn a_compact_map_is_measured_and_shaded_as_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (whole, compact) = (file("whole.ktx2"), file("compact.ktx2"));
+    let bake = |output: &str, more: &[&str]| {
+        let words = ["bake", "builtin:foil", output, "--map-size", "64", "--method", "vmf:2", "--json"];
+        json(&[&words[..], more].concat())
+    };
+    let said = bake(&whole, &[]);
+    assert_eq!((&said["levels"], &said["video_bytes"]), (&json!(7), &json!(5461 * 16)));
+    let said = bake(&compact, &["--precision", "unorm8", "--from-level", "1"]);
+    // A third of the texels of level 0, two layers of four bytes.
+    assert_eq!((&said["width"], &said["levels"]), (&json!(32), &json!(6)));
+    assert_eq!(said["video_bytes"], json!(1365 * 8));
+    let seen = json(&["inspect", &compact, "--json"]);
+    assert_eq!((&seen["from_level"], &seen["compact"]["bits"]), (&json!(1), &json!(8)));
+    let report = file("report");
+    let baked = format!("{whole},{compact}");
+    let words = ["compare", "builtin:foil", "--map-size", "64", "--baked", &baked, "--filtering"];
+    let compared = json(&[&words[..], &["--report", &report, "--json"]].concat());
+    let [whole, compact] = ["whole.ktx2", "compact.ktx2"].map(|name| &compared["methods"][name]);
+    let first = |list: &Value| list.as_array().unwrap()[0]["level"].as_u64().unwrap();
+    assert_eq!((first(&whole["levels"]), first(&compact["levels"])), (0, 1));
+    assert_eq!(first(&compact["filtering"]), 1);
+    for level in compact["levels"].as_array().unwrap() {
+        let at = level["level"].as_u64().unwrap() as usize;
+        let own = level["error"].as_f64().unwrap();
+        let due = whole["levels"][at]["error"].as_f64().unwrap();
+        // Measured: at most 1.01 times.
+        assert!(own < 1.03 * due, "{at}: {own} {due}");
+    }
+    let (status, table, _) = outcome(&words);
+    assert!(status == 0 && table.contains("compact.ktx2      8      0.0      -"), "{table}");
+    let page = std::fs::read_to_string(folder.path().join("report/report.html")).unwrap();
+    assert!(page.contains("compact.ktx2"));
+    let path = file("compact.ktx2");
+    let (status, shader, _) = outcome(&["shader", &path]);
+    assert!(status == 0 && shader.contains("method vmf:2") && shader.contains("RGBA8 unorm"));
+    assert_eq!(shader.matches("    channels[").count(), 2);
+    for (words, says) in [
+        (vec!["shader", &*path, "--method", "vmf:2"], "cannot be used with"),
+        (vec!["shader", "Cargo.toml"], "Cargo.toml"),
+        (vec!["bake", "builtin:foil", &*path, "--from-level", "20"], "there is none from 20"),
+        (vec!["bake", "builtin:foil", &*file("a.exr"), "--precision", "unorm10"], "OpenEXR holds floats"),
+        (vec!["bake", "builtin:foil", &*path, "--precision", "unorm9"], "unorm10"),
+    ] {
+        let (status, _, stderr) = outcome(&words);
+        assert!(status > 0 && stderr.contains(says), "{words:?}: {stderr}");
+    }
 }
 
 #[test]

@@ -332,20 +332,10 @@ impl Compact {
     #[must_use]
     pub fn of(bits: Bits, pyramid: &Pyramid, encoding: Encoding) -> Self {
         let layers = pyramid.layers();
-        let each = |mut take: Box<dyn FnMut(usize, &[f32]) + '_>| {
-            for level in 0..pyramid.sizes().len() {
-                let bytes = pyramid.level_bytes(level);
-                for (layer, bytes) in bytes.chunks(bytes.len() / layers).enumerate() {
-                    let mut values = Vec::new();
-                    pyramid.precision().unpack(bytes, &mut values);
-                    take(layer, &values);
-                }
-            }
-        };
         let mut extent = Extent::new(layers);
-        each(Box::new(|layer, values| extent.add(layer, values)));
+        layers_of(pyramid, |layer, values| extent.add(layer, values));
         let mut spread = Spread::new(extent);
-        each(Box::new(|layer, values| spread.add(layer, values)));
+        layers_of(pyramid, |layer, values| spread.add(layer, values));
         Self::of_spread(bits, &spread, encoding)
     }
 
@@ -438,6 +428,18 @@ impl Compact {
     }
 }
 
+/// Hands out the values of every layer of every level.
+fn layers_of(pyramid: &Pyramid, mut each: impl FnMut(usize, &[f32])) {
+    for level in 0..pyramid.sizes().len() {
+        let bytes = pyramid.level_bytes(level);
+        for (layer, bytes) in bytes.chunks(bytes.len() / pyramid.layers()).enumerate() {
+            let mut values = Vec::new();
+            pyramid.precision().unpack(bytes, &mut values);
+            each(layer, &values);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -473,8 +475,8 @@ mod tests {
         let (alpha, r) = (1.6_f32 / 255.0, [0.9, 0.2, 0.4]);
         let texel = [1.0 - alpha, 0.0, 0.0, 0.0, alpha, alpha * r[0], alpha * r[1], alpha * r[2]];
         let stored = rounded(&compact, &texel);
-        // 1.6 steps become 2, and 0.9 of two steps 2 again. By itself it is 1.44 steps, which would be 1: half
-        // of the weight, where nine tenths are due.
+        // 1.6 steps become 2, and 0.9 of two steps 2 again. By itself it is 1.44 steps, which would be 1:
+        // half of the weight, where nine tenths are due.
         assert_eq!(stored[4..], [2, 2, 0, 1]);
         assert_eq!(compact.value(4, 2), 2.0 / 255.0);
     }
@@ -493,8 +495,8 @@ mod tests {
         let one = Encoding::Lobes { kind: LobeKind::Spherical, count: 1, sums: StoredSums::AboutPole };
         let compact = Compact::of_spread(Bits::Eight, &spread, one);
         let [weight, x, ..] = compact.ranges() else { unreachable!() };
-        // Weights have their whole range. Five texels may lie beyond that of x, fewer than a part of its extent
-        // holds, which is 0.8/4096 wide: its end is that of the part where the others end.
+        // Weights have their whole range. Five texels may lie beyond that of x, fewer than a part of its
+        // extent holds, which is 0.8/4096 wide: its end is that of the part where the others end.
         assert_eq!((weight.low, weight.high, x.low), (1.0, 1.0, 0.0));
         assert!(x.high > 0.0995 && x.high < 0.1003, "{x:?}");
         let stored = rounded(&compact, &texel(100));

@@ -4,7 +4,8 @@
 //! writes `NAME_stock.glb` for each: a plane to the horizon and a sphere of one metal, whose roughness is a
 //! number or a grey picture. `... -- table FOLDER [WORST MEAN]` reads pictures that engines rendered
 //! (`ENGINE_MAP_OBJECT_LIGHT_FILTER_VARIANT.f32`, and their `..._truth.f32`) and prints each variant's errors
-//! and their ratios to stock; `... -- sheet FOLDER CASE... FILE` draws them beside the truth.
+//! and their ratios to stock; `... -- sheet FOLDER VARIANT,VARIANT CASE... FILE` draws variants beside the
+//! truth.
 //! `tests/engines/run` does both.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -35,16 +36,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         ["table", folder, worst, mean] => {
             table(Path::new(folder), Some(Passing { worst: worst.parse()?, mean: mean.parse()? }))
         }
-        ["sheet", folder, cases @ .., file] => sheet(Path::new(folder), cases, Path::new(file)),
+        ["sheet", folder, variants, cases @ .., file] => {
+            sheet(Path::new(folder), &variants.split(',').collect::<Vec<_>>(), cases, Path::new(file))
+        }
         _ => Err(
-            "models FOLDER NAME=NORMAL[,ROUGHNESS]..., table FOLDER [WORST MEAN], or sheet FOLDER CASE... FILE"
+            "models FOLDER NAME=NORMAL[,ROUGHNESS]..., table FOLDER [WORST MEAN], or sheet FOLDER VARIANT,VARIANT CASE... FILE"
                 .into(),
         ),
     }
 }
-
-/// Variants of a model, as `tests/engines/run` makes them.
-const VARIANTS: [&str; 3] = ["stock", "kappa", "fixed"];
 
 /// Mesh of glTF.
 #[derive(Default)]
@@ -268,17 +268,17 @@ fn masked(picture: &Picture, mask: &Grid<bool>) -> Picture {
 }
 
 /// Draws cases: the truth, and each variant with its errors.
-fn sheet(folder: &Path, cases: &[&str], file: &Path) -> Result<(), Box<dyn Error>> {
+fn sheet(folder: &Path, variants: &[&str], cases: &[&str], file: &Path) -> Result<(), Box<dyn Error>> {
     let picture_of = |name: &str| picture(&folder.join(format!("{name}.f32")));
     let mut sheet = Sheet { columns: vec!["truth".to_owned()], ..Sheet::default() };
-    sheet.columns.extend(VARIANTS.map(|variant| variant.to_owned()));
+    sheet.columns.extend(variants.iter().map(|variant| (*variant).to_owned()));
     for case in cases {
         let parts: Vec<&str> = case.split('_').collect();
         let [engine, map, object, light, filter] = parts[..] else { return Err("no such case".into()) };
         let truth = picture_of(&format!("{engine}_{map}_{object}_{light}_truth"))?;
         let judge = Judge::new(object, &truth);
         let mut panels = vec![Some(Panel::of(to_bytes(&truth, judge.exposure)))];
-        for variant in VARIANTS {
+        for variant in variants {
             let shown = picture_of(&format!("{case}_{variant}"))?;
             let Errors { l2, flip } = judge.errors(&shown);
             let panel = Panel::of(to_bytes(&shown, judge.exposure));

@@ -1,9 +1,9 @@
 //! UASTC by our packer and by others, on the same texels in the same run: time, error and bytes.
 //!
-//! `cargo run --release -p ndfmap-maps --features basis --example encoders -- write FOLDER NAME=PICTURE...` writes the texels
-//! of each picture (`NAME.rgba` and its size in `NAME.json`); `... -- table FOLDER` packs them, reads what
-//! others made of them (`NAME.ENCODER.ktx2`, and its seconds in `NAME.ENCODER.json`), and prints a table.
-//! `tests/engines/run --encoders MAPS` does both.
+//! `cargo run --release -p ndfmap-maps --features basis --example encoders -- write FOLDER NAME=PICTURE...`
+//! writes the texels of each picture (`NAME.rgba` and its size in `NAME.json`); `... -- table FOLDER` packs
+//! them, reads what others made of them (`NAME.ENCODER.ktx2`, and its seconds in `NAME.ENCODER.json`), and
+//! prints a table. `tests/engines/run --encoders MAPS` does both.
 
 use std::error::Error;
 use std::path::Path;

@@ -86,8 +86,8 @@ pub struct WriteOptions {
     pub zstd: Option<i32>,
     /// Channels of an OpenEXR.
     pub channels: ChannelLayout,
-    /// Bits of channels as integers, each in the range that its values fill, for KTX2; `None` for floats. Maps
-    /// are then baked in single precision.
+    /// Bits of channels as integers, each in the range that its values fill, for KTX2; `None` for floats.
+    /// Maps are then baked in single precision.
     pub compact: Option<Bits>,
     /// Precision of bumpslopes, whose units differ from the map's; `None` for the map's own.
     pub precision: Option<Precision>,
