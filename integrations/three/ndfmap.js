@@ -9,7 +9,8 @@
 
 import {
   ClampToEdgeWrapping, CompressedArrayTexture, FileLoader, HalfFloatType, LinearFilter, LinearMipmapLinearFilter,
-  Loader, NoColorSpace, RGBAFormat, RepeatWrapping, UnsignedByteType, Vector2, Vector4,
+  Loader, NoColorSpace, RGBAFormat, RepeatWrapping, TangentSpaceNormalMap, UnsignedByteType,
+  Vector2, Vector4,
 } from 'three';
 import { read } from 'three/addons/libs/ktx-parse.module.js';
 import { ZSTDDecoder } from 'three/addons/libs/zstddec.module.js';
@@ -19,6 +20,7 @@ const FORMATS = {
   37: { type: UnsignedByteType, array: Uint8Array },
   97: { type: HalfFloatType, array: Uint16Array },
 };
+const HALVES = 97;
 const ZSTANDARD = 2;
 
 /** Map of lobes: a texture whose layers are lobes, and how to read it. */
@@ -85,14 +87,22 @@ export class NdfLoader extends Loader {
     } catch {
       fail('has a key `ndfmap` that cannot be read');
     }
-    if (header.version > 2) fail(`has header version ${header.version}; this loader reads up to 2`);
-    const lobes = /^vmf:(\d)/.exec(header.method ?? '');
+    if (!(header?.version <= 2)) fail(`has header version ${header?.version}; this loader reads up to 2`);
+    const lobes = /^vmf:([1-8])/.exec(header.method ?? '');
     if (!lobes || header.encoding !== 'sums-about-pole') {
       fail(`was baked by \`${header.method}\`; lobes of \`vmf:1\` to \`vmf:8\` are read`);
     }
-    const format = FORMATS[file.vkFormat];
-    if (!format) fail('has texels of a kind that WebGL does not filter: bake it with --precision unorm8 or half');
     const depth = Number(lobes[1]);
+    const compact = header.compact;
+    const format = FORMATS[file.vkFormat];
+    if (!format || (compact ? compact.bits !== 8 : file.vkFormat !== HALVES) || (compact && file.vkFormat === HALVES)) {
+      fail('has texels of a kind that WebGL does not filter: bake it with --precision unorm8 or half');
+    }
+    const isRange = (range) => Array.isArray(range) && range.length === 2 && range.every(Number.isFinite) && range[0] <= range[1];
+    if (compact && !(compact.ranges?.length >= 4 * depth && compact.ranges.every(isRange))) {
+      fail('has no sound range for each channel');
+    }
+    if (header.wrap?.length !== 2) fail('does not say how it wraps');
     if (file.layerCount < depth) fail(`has ${file.layerCount} layers, where \`${header.method}\` has ${depth}`);
     const compressed = file.supercompressionScheme === ZSTANDARD;
     if (file.supercompressionScheme && !compressed) fail('is compressed in a way that is not read');
@@ -236,16 +246,24 @@ const DECODING = /* glsl */`
 ndfDecode( vNormalMapUv, tbn, normalScale, normal );
 `;
 
+// Materials that maps were applied to.
+const APPLIED = new WeakMap();
+
 /**
- * Lets a material be shaded by a map's lobes.
+ * Lets a material be shaded by a map's lobes. Once more, it takes the new map.
  *
  * @param {MeshStandardMaterial} material Standard or physical, with the normal map that the map was baked from.
  * @param {NdfMap} map Its map.
  * @returns {MeshStandardMaterial} The material.
  */
 export function applyNdf(material, map) {
-  if (!material.isMeshStandardMaterial) throw new Error('applyNdf: the material is not standard or physical');
-  if (!material.normalMap) throw new Error('applyNdf: the material has no normal map, whose place a map takes');
+  const refuse = (reason) => { throw new Error(`applyNdf: the material ${reason}`); };
+  if (!material.isMeshStandardMaterial) refuse('is not standard or physical');
+  if (!material.normalMap) refuse('has no normal map, whose place a map takes');
+  if (material.normalMapType !== TangentSpaceNormalMap) refuse('has normals in object space');
+  for (const key of ['anisotropy', 'sheen', 'retroreflectivity']) {
+    if (material[key] > 0) refuse(`has ${key}, which lobes do not have`);
+  }
   map.texture.anisotropy = material.normalMap.anisotropy;
   const uniforms = {
     ndfMap: { value: map.texture },
@@ -257,17 +275,28 @@ export function applyNdf(material, map) {
     // Rows of a map run down, as those of glTF's textures do.
     ndfFlip: { value: material.normalMap.flipY ? 1 : 0 },
   };
+  const applied = APPLIED.get(material);
+  if (applied) {
+    // Another map, or the same once more: the shader is there.
+    Object.keys(uniforms).forEach((name) => { applied.uniforms[name].value = uniforms[name].value; });
+    if (applied.lobes !== map.lobes) material.needsUpdate = true;
+    applied.lobes = map.lobes;
+    return material;
+  }
+  const own = { uniforms, lobes: map.lobes };
+  APPLIED.set(material, own);
   const before = material.onBeforeCompile;
-  const key = material.customProgramCacheKey;
+  // The engine's own key tells hooks apart by their text, which is now ours.
+  const key = material.customProgramCacheKey();
   material.onBeforeCompile = (shader, renderer) => {
-    before?.call(material, shader, renderer);
-    Object.assign(shader.uniforms, uniforms);
+    before.call(material, shader, renderer);
+    Object.assign(shader.uniforms, own.uniforms);
     shader.fragmentShader = shader.fragmentShader
       .replace('#include <lights_physical_pars_fragment>',
-        `#define NDF_LOBES ${map.lobes}\n${DECLARATIONS}\n#include <lights_physical_pars_fragment>\n${SHADING}`)
+        `#define NDF_LOBES ${own.lobes}\n${DECLARATIONS}\n#include <lights_physical_pars_fragment>\n${SHADING}`)
       .replace('#include <normal_fragment_maps>', DECODING);
   };
-  material.customProgramCacheKey = () => `${key.call(material)}|ndf${map.lobes}`;
+  material.customProgramCacheKey = () => `${key}|ndf${own.lobes}`;
   material.needsUpdate = true;
   return material;
 }

@@ -1,4 +1,4 @@
-// UASTC by Binomial's encoder: `node encoders.mjs FOLDER` packs every NAME.rgba of the folder at two levels of effort,
+// UASTC by Binomial's encoder: `node encoders.mjs FOLDER` packs every NAME.rgba of the folder at three levels of effort,
 // into NAME.binomial-LEVEL.ktx2, and writes the seconds beside it.
 import { readdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';

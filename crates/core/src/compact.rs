@@ -207,7 +207,7 @@ impl Range {
     /// True for a range that values can be taken to.
     #[must_use]
     pub fn is_sound(self) -> bool {
-        self.low.is_finite() && self.high.is_finite() && self.low <= self.high
+        self.low.is_finite() && (self.high - self.low).is_finite() && self.low <= self.high
     }
 }
 
@@ -233,7 +233,10 @@ impl Extent {
 
     /// Ranges of the channels; that of 0 where nothing was taken in, or what is no number.
     fn ranges(&self) -> Vec<Range> {
-        let sound = |range: &Range| if range.is_sound() { *range } else { Range { low: 0.0, high: 0.0 } };
+        // A zero has one sign, whichever came first.
+        let plain = |range: &Range| Range { low: range.low + 0.0, high: range.high + 0.0 };
+        let sound =
+            |range: &Range| if range.is_sound() { plain(range) } else { Range { low: 0.0, high: 0.0 } };
         self.0.iter().map(sound).collect()
     }
 }
@@ -285,8 +288,8 @@ impl Spread {
         let (below, above) = (cut(&mut counts.iter()), cut(&mut counts.iter().rev()));
         let step = (f64::from(high) - f64::from(low)) / BINS as f64;
         Range {
-            low: ((f64::from(low) + step * below as f64) as f32).min(0.0),
-            high: ((f64::from(high) - step * above as f64) as f32).max(0.0),
+            low: ((f64::from(low) + step * below as f64) as f32).min(0.0) + 0.0,
+            high: ((f64::from(high) - step * above as f64) as f32).max(0.0) + 0.0,
         }
     }
 }
@@ -320,10 +323,15 @@ impl Compact {
     pub fn of_spread(bits: Bits, spread: &Spread, encoding: Encoding) -> Self {
         let mut own = Self::new(bits, spread.extent.ranges(), encoding);
         if own.lobes.is_some() {
-            let all = (0..own.ranges.len()).map(|c| {
-                if own.lobe_of(c).start == c { own.ranges[c] } else { spread.within(c, bits.outside()) }
-            });
-            own.ranges = all.collect();
+            let sums = own.lobes.map_or(0, |lobes| 4 * lobes.layers(0));
+            let range = |c: usize| match own.ranges[c] {
+                // A lobe can lose all of its weight, also one that never does.
+                Range { low, high } if own.lobe_of(c).start == c => Range { low: low.min(0.0), high },
+                // What lobes carry besides does not make them lose any.
+                whole if c >= sums => whole,
+                _ => spread.within(c, bits.outside()),
+            };
+            own.ranges = (0..own.ranges.len()).map(range).collect();
         }
         own
     }
@@ -494,21 +502,20 @@ mod tests {
         spread.add(0, &values);
         let one = Encoding::Lobes { kind: LobeKind::Spherical, count: 1, sums: StoredSums::AboutPole };
         let compact = Compact::of_spread(Bits::Eight, &spread, one);
-        let [weight, x, ..] = compact.ranges() else { unreachable!() };
+        let [weight, x, ..] = compact.ranges().to_vec()[..] else { unreachable!() };
         // Weights have their whole range. Five texels may lie beyond that of x, fewer than a part of its
         // extent holds, which is 0.8/4096 wide: its end is that of the part where the others end.
-        assert_eq!((weight.low, weight.high, x.low), (1.0, 1.0, 0.0));
+        assert_eq!((weight.low, weight.high, x.low), (0.0, 1.0, 0.0));
         assert!(x.high > 0.0995 && x.high < 0.1003, "{x:?}");
         let stored = rounded(&compact, &texel(100));
         assert_eq!(stored[1], (255.0_f32 * 1e-3 / x.high).round() as u16);
-        // With a weight that can fall the steep one has an eighth of it, and goes the same way.
-        let mut ranges = compact.ranges().to_vec();
-        ranges[0].low = 0.0;
-        let compact = Compact::new(Bits::Sixteen, ranges, one);
+        // The steep one has an eighth of its weight, and goes the same way.
+        let compact = Compact::of_spread(Bits::Eight, &spread, one);
         let stored = rounded(&compact, &texel(STEEP));
         let value = |channel: usize| compact.value(channel, stored[channel]);
-        assert!((value(0) - 0.125).abs() < 1e-3, "{}", value(0));
-        assert!((value(1) / value(0) - 0.8).abs() < 1e-3 && (value(3) / value(0) - 0.4).abs() < 1e-3);
+        // 32 of 255 steps; half a step of x is a 64th of it.
+        assert_eq!(stored[0], 32);
+        assert!((value(1) / value(0) - 0.8).abs() < 0.02 && (value(3) / value(0) - 0.4).abs() < 0.02);
         // No spread for channels that are no lobes: all of them lie within.
         assert_eq!(Compact::of_spread(Bits::Eight, &spread, Encoding::MeanNormal).ranges()[1].high, 0.8);
     }

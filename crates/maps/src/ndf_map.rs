@@ -11,7 +11,7 @@ use ndfmap_core::pyramid::{Layout, Precision, Pyramid};
 
 use crate::formats::{WriteOptions, check_integers, read_file, read_ndf, to_write};
 use crate::image::check_size;
-use crate::{Header, MapError};
+use crate::{COMPACT_VERSION, Header, MapError, VERSION};
 
 /// A normal distribution map.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,7 +42,8 @@ impl NdfMap {
         check_integers(path, format, options)?;
         if options.compact.is_none() && self.header.compact.is_some() {
             // Floats have no ranges.
-            let header = Header { compact: None, ..self.header.clone() };
+            let version = if self.header.from_level == 0 { VERSION } else { COMPACT_VERSION };
+            let header = Header { version, compact: None, ..self.header.clone() };
             return Self { header, pyramid: self.pyramid.clone() }.save(path, options);
         }
         match format.write_ndf {

@@ -301,6 +301,8 @@ fn a_document_and_its_files_become_one() {
         ("\"byteLength\":17", "\"byteLength\":20", "of the 20 bytes of buffer 0"),
         ("\"buffer\":2", "\"buffer\":7", "not there"),
         ("a.bin", "b.bin", "b.bin"),
+        ("\"byteOffset\":2", "\"byteOffset\":18446744073709551615", "beyond the end of its buffer"),
+        ("\"byteOffset\":2", "\"byteOffset\":13", "beyond the end of its buffer"),
     ] {
         let bad = text.replacen(from, to, 1);
         assert_ne!(bad, text);

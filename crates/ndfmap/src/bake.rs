@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use ndfmap_core::bake::{Bake, BakeReport as Baked, LevelSink, Place};
-use ndfmap_core::compact::Storage;
+use ndfmap_core::compact::{Compact, Storage};
 use ndfmap_core::fit::Rgba;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::ndf::{AnyMethod, Encoding};
@@ -14,7 +14,7 @@ use ndfmap_maps::attribute::AttributeMap;
 use ndfmap_maps::formats::{NdfSink, check_integers, to_write};
 use ndfmap_maps::source::SourceMap;
 use ndfmap_maps::{
-    COMPACT_VERSION, ChannelLayout, Header, MAX_ATTRIBUTES, MapError, NdfMap, VERSION, WriteOptions,
+    COMPACT_VERSION, ChannelLayout, Header, Integers, MAX_ATTRIBUTES, MapError, NdfMap, VERSION, WriteOptions,
 };
 use serde::Serialize;
 
@@ -185,8 +185,12 @@ impl<'a> BakeJob<'a> {
         let values = self.values();
         let (pyramid, report) = self.begin(&values).to_pyramid()?;
         refuse_overflow(report, file)?;
-        let pyramid = pyramid.from_level(self.from_level);
-        Ok(NdfMap { header: self.header(), pyramid })
+        let (header, pyramid) = (self.header(), pyramid.from_level(self.from_level));
+        let Storage::Compact(bits) = self.storage else { return Ok(NdfMap { header, pyramid }) };
+        let compact = Compact::of(bits, &pyramid, self.method.encoding());
+        let own = Some(Integers::of(&compact));
+        let header = Header { version: COMPACT_VERSION, compact: own, ..header };
+        Ok(NdfMap { header, pyramid: compact.rounded(&pyramid) })
     }
 
     /// Bakes into a file, in the format that its name asks for: whole, or not at all.

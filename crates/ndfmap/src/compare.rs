@@ -13,7 +13,7 @@ use ndfmap_core::measure::{
 };
 use ndfmap_core::ndf::{AnyMethod, Shows};
 use ndfmap_core::observe::Observer;
-use ndfmap_core::pyramid::{Pyramid, level_sizes};
+use ndfmap_core::pyramid::{Precision, Pyramid, level_sizes};
 use ndfmap_core::roughness::{EngineLobe, RoughSurface};
 use ndfmap_core::surface::Surface;
 use ndfmap_core::units::{Alpha, PerceptualRoughness};
@@ -257,7 +257,12 @@ fn engines(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Vec<Row>, E
             "an engine's formula widens the roughness of a highlight, from 0 to 1, which this lobe has not";
         return Err(Error::Request(format!("{lobe}: {why}")));
     };
-    let (size, precision) = (subject.surface.size(), subject.storage.baked());
+    // A normal and a roughness map are not of our storage: half floats, unless others are asked for.
+    let precision = match subject.storage {
+        Storage::Float(precision) => precision,
+        Storage::Compact(_) => Precision::Half,
+    };
+    let size = subject.surface.size();
     let roughness = Grid::from_fn(size, |_, _| roughness.get() as f32);
     let surface =
         RoughSurface::new(subject.surface, &roughness).map_err(|e| Error::Request(e.to_string()))?;

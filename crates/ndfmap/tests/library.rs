@@ -6,6 +6,7 @@ use std::sync::Mutex;
 
 use ndfmap::compare::{Row, Subject, compare};
 use ndfmap::core::brdf::AnyLobe;
+use ndfmap::core::compact::{Bits, Storage};
 use ndfmap::core::grid::{Grid, Size};
 use ndfmap::core::lookup::Lookups;
 use ndfmap::core::ndf::{AnyMethod, Slopes, Vmf};
@@ -211,6 +212,18 @@ fn engines_are_measured_beside_methods() {
         let refused = compared(lobe).unwrap_err();
         assert!(matches!(&refused, Error::Request(said) if said.contains("roughness")), "{refused}");
     }
+}
+
+#[test]
+fn a_compact_map_in_memory_is_that_of_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.ktx2");
+    let map = foil();
+    let job = BakeJob::new(&map, Vmf::new(1).unwrap()).storage(Storage::Compact(Bits::Eight)).from_level(1);
+    job.save(&path, &WriteOptions::default()).unwrap();
+    let read = NdfMap::open(&path).unwrap();
+    assert!(job.to_map().unwrap() == read);
+    assert_eq!((read.header.from_level, read.pyramid.sizes()[0]), (1, Size { width: 12, height: 8 }));
 }
 
 #[test]

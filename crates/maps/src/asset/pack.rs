@@ -1,5 +1,6 @@
 //! Documents with files beside them, put into one binary file.
 
+use std::collections::HashMap;
 use std::ops::Range;
 
 use serde_json::{Map, Value, json};
@@ -38,7 +39,8 @@ impl Asset {
         if self.is_binary() {
             return Ok(self);
         }
-        let mut pack = Pack { json: self.json.clone(), asset: &self, bin: Vec::new() };
+        let mut pack =
+            Pack { json: self.json.clone(), asset: &self, bin: Vec::new(), stored: HashMap::new() };
         pack.buffers()?;
         pack.images()?;
         let Pack { json, bin, .. } = pack;
@@ -54,6 +56,8 @@ struct Pack<'a> {
     asset: &'a Asset,
     json: Value,
     bin: Vec<u8>,
+    /// Places of files that are in already.
+    stored: HashMap<&'a str, Range<usize>>,
 }
 
 /// New place of a buffer: its index, and where it begins in that one.
@@ -61,9 +65,11 @@ struct Pack<'a> {
 struct Moved {
     index: usize,
     start: usize,
+    /// Bytes that its views may be of.
+    length: u64,
 }
 
-impl Pack<'_> {
+impl<'a> Pack<'a> {
     /// Objects of a list of the document; none where there is no such list.
     fn list(&mut self, name: &str) -> Result<Vec<&mut Map<String, Value>>, MapError> {
         let asset = self.asset;
@@ -73,12 +79,20 @@ impl Pack<'_> {
         objects.ok_or_else(|| asset.invalid(format!("has `{name}` that is no list of objects")))
     }
 
-    /// Puts bytes into the binary chunk; says where.
-    fn store(&mut self, bytes: &[u8]) -> Range<usize> {
+    /// Puts a file into the binary chunk, once; says where.
+    fn store(&mut self, uri: &'a str, bytes: &[u8]) -> Result<Range<usize>, MapError> {
+        if let Some(place) = self.stored.get(uri) {
+            return Ok(place.clone());
+        }
         let start = self.bin.len().next_multiple_of(ALIGNMENT);
+        if start + bytes.len() > u32::MAX as usize {
+            let reason = "would be larger than the 4 GiB of a binary glTF";
+            return Err(MapError::unsupported(&self.asset.path, reason));
+        }
         self.bin.resize(start, 0);
         self.bin.extend_from_slice(bytes);
-        start..self.bin.len()
+        self.stored.insert(uri, start..self.bin.len());
+        Ok(start..self.bin.len())
     }
 
     /// Joins buffers that have bytes into the first, and leads their views there.
@@ -99,24 +113,29 @@ impl Pack<'_> {
         for (i, length) in lengths.into_iter().enumerate() {
             let Some(uri) = asset.document.buffers.get(i).and_then(|buffer| buffer.uri.as_ref()) else {
                 kept.push(i);
-                moved.push(Moved { index: kept.len(), start: 0 });
+                moved.push(Moved { index: kept.len(), start: 0, length: u64::MAX });
                 continue;
             };
             let file = resource(&asset.path, uri)?;
-            let bytes = usize::try_from(length).ok().and_then(|length| file.bytes.get(..length));
-            let bytes = bytes.ok_or_else(|| {
+            if file.bytes.len() as u64 >= length {
+                let start = self.store(uri, &file.bytes)?.start;
+                moved.push(Moved { index: 0, start, length });
+            } else {
                 let reason = format!("has {} of the {length} bytes of buffer {i}", file.bytes.len());
-                MapError::invalid(&file.path, reason)
-            })?;
-            let start = self.store(bytes).start;
-            moved.push(Moved { index: 0, start });
+                return Err(MapError::invalid(&file.path, reason));
+            }
         }
         let lead = |view: &mut Map<String, Value>| {
             let old = view.get("buffer").and_then(Value::as_u64).and_then(|i| usize::try_from(i).ok());
             let old = old.and_then(|i| moved.get(i));
-            let Moved { index, start } =
+            let Moved { index, start, length } =
                 *old.ok_or_else(|| asset.invalid("has a view of a buffer that is not there"))?;
-            let offset = view.get("byteOffset").and_then(Value::as_u64).unwrap_or(0);
+            let number = |key: &str| view.get(key).and_then(Value::as_u64).unwrap_or(0);
+            let (offset, own) = (number("byteOffset"), number("byteLength"));
+            // Beyond its own buffer it would see another's bytes.
+            if offset.checked_add(own).is_none_or(|end| end > length) {
+                return Err(asset.invalid("has a view beyond the end of its buffer"));
+            }
             view.insert("buffer".to_owned(), index.into());
             if start > 0 {
                 view.insert("byteOffset".to_owned(), (offset + start as u64).into());
@@ -155,7 +174,7 @@ impl Pack<'_> {
                 file.bytes.get(*at..).is_some_and(|bytes| bytes.starts_with(first))
             };
             let kind = KINDS.iter().find(known).map(|(_, _, kind)| *kind);
-            let place = self.store(&file.bytes);
+            let place = self.store(uri, &file.bytes)?;
             let views = self.json.as_object_mut().map(|root| root.entry("bufferViews").or_insert(json!([])));
             let views = views.and_then(Value::as_array_mut);
             let views = views.ok_or_else(|| asset.invalid("has `bufferViews` that is no list"))?;

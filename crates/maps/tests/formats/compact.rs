@@ -4,7 +4,7 @@ use ndfmap_core::bake::{LevelSink as _, Place};
 use ndfmap_core::compact::{Bits, Compact};
 use ndfmap_core::pyramid::Precision;
 use ndfmap_maps::formats::{read_file, read_ndf, to_write};
-use ndfmap_maps::{COMPACT_VERSION, Header, NdfMap, WriteOptions};
+use ndfmap_maps::{COMPACT_VERSION, Header, NdfMap, VERSION, WriteOptions};
 
 use crate::common::baked;
 
@@ -57,9 +57,13 @@ fn floats_of_integers_have_no_ranges() {
     let integers = WriteOptions { compact: Some(Bits::Eight), ..WriteOptions::default() };
     baked("vmf:2", "foil", Precision::Single).save(&path, &integers).unwrap();
     let map = NdfMap::open(&path).unwrap();
+    let bytes = read_file(&path).unwrap();
+    map.save(&path, &integers).unwrap();
+    assert!(read_file(&path).unwrap() == bytes, "integers go back as they were");
     map.save(&path, &WriteOptions::default()).unwrap();
     let again = NdfMap::open(&path).unwrap();
     assert!(again.header.compact.is_none() && again.pyramid == map.pyramid);
+    assert_eq!(again.header.version, VERSION);
     let error = map.save(&folder.path().join("map.exr"), &integers).unwrap_err().to_string();
     assert!(error.contains("unorm8") && error.contains("OpenEXR holds floats"), "{error}");
 }

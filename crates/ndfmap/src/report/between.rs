@@ -47,7 +47,7 @@ pub fn corner_sheet(subject: &Subject<'_>, comparison: &Comparison) -> Result<Op
     let mut drawn = Vec::new();
     for Mixture { row, method, unaligned } in &rows {
         let bake = Bake::new(subject.surface, &**unaligned).precision(subject.storage.baked());
-        let (apart, _) = bake.to_pyramid()?;
+        let apart = subject.storage.stored(bake.to_pyramid()?.0, unaligned.encoding());
         let filtered = |pyramid: &Pyramid, method: &dyn Method| {
             let mut out = vec![0.0; lattice.len()];
             let mut channels = vec![0.0; pyramid.channels()];

@@ -108,10 +108,11 @@ fn verdict(comparison: &Comparison) -> Option<String> {
     let mean = |row: &Row| {
         let judged: Vec<f64> =
             row.levels.iter().filter(|l| JUDGED.contains(&l.level)).map(|l| l.error).collect();
-        (!judged.is_empty()).then(|| judged.iter().sum::<f64>() / judged.len() as f64)
+        // A map that leaves some of them out cannot be set beside the others.
+        (!judged.is_empty() && row.from_level <= *JUDGED.start())
+            .then(|| judged.iter().sum::<f64>() / judged.len() as f64)
     };
-    let all: Option<Vec<(&Row, f64)>> = comparison.rows.iter().map(|row| Some((row, mean(row)?))).collect();
-    let all = all?;
+    let all: Vec<(&Row, f64)> = comparison.rows.iter().filter_map(|row| Some((row, mean(row)?))).collect();
     let (best, least) = all.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
     let others = all.iter().filter(|(row, _)| row.method != best.method);
     let beside = |(row, error): &(&Row, f64)| {

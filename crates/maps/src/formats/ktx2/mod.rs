@@ -210,7 +210,12 @@ fn write_ndf(path: &Path, map: &NdfMap, options: &WriteOptions) -> Result<u64, M
     check_channels(path, options)?;
     let (p, layout) = (&map.pyramid, map.pyramid.layout());
     if let Some(bits) = options.compact {
-        let compact = Compact::of(bits, p, map.method(path)?.encoding());
+        // What was read from integers goes back into them as it was.
+        let own = map.compact(path)?.filter(|own| own.bits() == bits);
+        let compact = match own {
+            Some(own) => own,
+            None => Compact::of(bits, p, map.method(path)?.encoding()),
+        };
         let written = CompactMap { header: &map.header, layout, compact: &compact, rows: p };
         return written.write(AtomicFile::create(path)?, options.zstd);
     }
