@@ -15,12 +15,13 @@ import {
 import { read } from 'three/addons/libs/ktx-parse.module.js';
 import { ZSTDDecoder } from 'three/addons/libs/zstddec.module.js';
 
-// Vulkan's formats of maps, and what three.js calls them.
-const FORMATS = {
-  37: { type: UnsignedByteType, array: Uint8Array },
-  97: { type: HalfFloatType, array: Uint16Array },
-};
+// Vulkan's formats of maps (RGBA8 unorm, RGBA16 floats), and the names that three.js has for them.
+const BYTES = 37;
 const HALVES = 97;
+const FORMATS = {
+  [BYTES]: { type: UnsignedByteType, array: Uint8Array },
+  [HALVES]: { type: HalfFloatType, array: Uint16Array },
+};
 const ZSTANDARD = 2;
 
 /** Map of lobes: a texture whose layers are lobes, and how to read it. */
@@ -95,7 +96,7 @@ export class NdfLoader extends Loader {
     const depth = Number(lobes[1]);
     const compact = header.compact;
     const format = FORMATS[file.vkFormat];
-    if (!format || (compact ? compact.bits !== 8 : file.vkFormat !== HALVES) || (compact && file.vkFormat === HALVES)) {
+    if (file.vkFormat !== (compact ? BYTES : HALVES) || (compact && compact.bits !== 8)) {
       fail('has texels of a kind that WebGL does not filter: bake it with --precision unorm8 or half');
     }
     const isRange = (range) => Array.isArray(range) && range.length === 2 && range.every(Number.isFinite) && range[0] <= range[1];
@@ -182,18 +183,8 @@ void ndfDecode( const in vec2 uv, const in mat3 frame, const in vec2 scale, cons
 }
 `;
 
-// The engine's own shading, once a lobe: widened as GGX is, alpha'² = alpha² + 2/kappa.
+// The engine's own shading, once a lobe. Rooms are looked up as wide as GGX: alpha'² = alpha² + 2/kappa.
 const SHADING = /* glsl */`
-PhysicalMaterial ndfMaterial( const in PhysicalMaterial material, const in int j, const in vec3 viewDir ) {
-	PhysicalMaterial own = material;
-	float alpha = pow2( material.roughness );
-	own.roughness = min( sqrt( sqrt( alpha * alpha + 2.0 * ndfVariance[ j ] ) ), 1.0 );
-	own.dfg = texture2D( dfgLUT, vec2( own.roughness, saturate( dot( ndfNormal[ j ], viewDir ) ) ) ).rg;
-	own.multiScatteringCompensation =
-		1.0 + own.specularColorBlended * ( 1.0 / max( own.dfg.x + own.dfg.y, 1e-3 ) - 1.0 );
-	return own;
-}
-
 // GGX blurred by a Gaussian of normals, about: part a Gaussian, part a GGX, both as wide. A GGX alone has tails
 // as if every facet were so rough, a haze over the dark. docs/three.md has what other shares gave.
 float ndfDensity( const in float alpha, const in float variance, const in float u ) {
@@ -224,6 +215,14 @@ void RE_Direct_Ndf( const in IncidentLight directLight, const in vec3 geometryPo
 }
 
 #ifdef USE_ENVMAP
+PhysicalMaterial ndfMaterial( const in PhysicalMaterial material, const in int j, const in vec3 viewDir ) {
+	PhysicalMaterial own = material;
+	float alpha = pow2( material.roughness );
+	own.roughness = min( sqrt( sqrt( alpha * alpha + 2.0 * ndfVariance[ j ] ) ), 1.0 );
+	own.dfg = texture2D( dfgLUT, vec2( own.roughness, saturate( dot( ndfNormal[ j ], viewDir ) ) ) ).rg;
+	return own;
+}
+
 void RE_IndirectSpecular_Ndf( const in vec3 radiance, const in vec3 irradiance, const in vec3 clearcoatRadiance, const in vec3 geometryPosition, const in vec3 geometryNormal, const in vec3 geometryViewDir, const in vec3 geometryClearcoatNormal, const in PhysicalMaterial material, inout ReflectedLight reflectedLight ) {
 	for ( int j = 0; j < NDF_ALL; j ++ ) {
 		float weight = ndfWeight[ j ];

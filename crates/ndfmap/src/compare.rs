@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use ndfmap_core::bake::Bake;
 use ndfmap_core::brdf::Lobe;
-use ndfmap_core::compact::{Bits, Storage};
+use ndfmap_core::compact::Storage;
 use ndfmap_core::grid::{Grid, Size};
 use ndfmap_core::measure::{
     BakedMap, Estimate, FilteringError, LevelErrors, TexelTruth, filtering_errors, lattice_for, level_errors,
@@ -129,13 +129,6 @@ fn of_levels(from: usize, estimates: &[Estimate]) -> Vec<LevelError> {
     estimates.iter().enumerate().map(|(level, e)| LevelError::of(from + level, e)).collect()
 }
 
-/// Storage that a map's file has.
-fn storage_of(map: &NdfMap) -> Storage {
-    let bits = map.header.compact.as_ref().map(|own| own.bits);
-    let compact = Bits::ALL.into_iter().find(|bits_of| Some(bits_of.count()) == bits);
-    compact.map_or(map.pyramid.precision().into(), Storage::Compact)
-}
-
 /// Rows as an object with a key a method.
 fn by_method<S: Serializer>(rows: &[Row], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_map(rows.iter().map(|row| (&row.method, row)))
@@ -186,9 +179,11 @@ pub fn compare(subject: &Subject<'_>, observer: &dyn Observer) -> Result<Compari
     let mut methods: Vec<AnyMethod> = Vec::new();
     for BakedFile { path, map } in subject.baked {
         methods.push(map.method(path)?);
+        let compact = map.compact(path)?;
+        let storage = compact.map_or(map.pyramid.precision().into(), |own| Storage::Compact(own.bits()));
         rows.push(Row {
             method: path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
-            bytes_per_texel: storage_of(map).texel_bytes(map.pyramid.layers()),
+            bytes_per_texel: storage.texel_bytes(map.pyramid.layers()),
             from_level: map.header.from_level,
             bake_seconds: 0.0,
             pyramid: map.pyramid.clone(),

@@ -4,7 +4,7 @@
 
 use std::sync::Mutex;
 
-use ndfmap::compare::{Row, Subject, compare};
+use ndfmap::compare::{Comparison, Row, Subject, compare};
 use ndfmap::core::brdf::AnyLobe;
 use ndfmap::core::compact::{Bits, Storage};
 use ndfmap::core::grid::{Grid, Size};
@@ -134,25 +134,33 @@ fn every_piece_of_a_rendering_runs_forwards_to_its_end_and_can_be_stopped() {
     ));
 }
 
-#[test]
-fn errors_say_how_sure_they_are() {
+/// Comparison on a foil of 64 × 64, at texels and between them.
+fn compared(
+    lobe: &str,
+    methods: &[AnyMethod],
+    engines: &[Origin],
+    precision: Precision,
+) -> Result<Comparison, Error> {
     let options = SourceOptions { builtin_size: Size { width: 64, height: 64 }, ..SourceOptions::default() };
     let map = read_source("builtin:foil".as_ref(), &options).unwrap();
-    let methods = ["toksvig", "vmf:2"].map(|m| m.parse::<AnyMethod>().unwrap());
-    let compared = |lobe: &str| {
-        let lobe = lobe.parse::<AnyLobe>().unwrap();
-        let subject = Subject {
-            name: "foil",
-            surface: &*map.surface,
-            lobe: &*lobe,
-            methods: &methods,
-            baked: &[],
-            engines: &[],
-            storage: Precision::Half.into(),
-            filtering: true,
-        };
-        compare(&subject, &Unobserved)
+    let lobe = lobe.parse::<AnyLobe>().unwrap();
+    let subject = Subject {
+        name: "foil",
+        surface: &*map.surface,
+        lobe: &*lobe,
+        methods,
+        baked: &[],
+        engines,
+        storage: precision.into(),
+        filtering: true,
     };
+    compare(&subject, &Unobserved)
+}
+
+#[test]
+fn errors_say_how_sure_they_are() {
+    let methods = ["toksvig", "vmf:2"].map(|m| m.parse::<AnyMethod>().unwrap());
+    let compared = |lobe: &str| compared(lobe, &methods, &[], Precision::Half);
     let comparison = compared("blinn-phong:50").unwrap();
     for row in &comparison.rows {
         // 64 × 64 and 32 × 32 texels are sampled, or measured whole; 16 × 16 and fewer are whole.
@@ -178,24 +186,9 @@ fn errors_say_how_sure_they_are() {
 fn engines_are_measured_beside_methods() {
     // Plain mips and a mean normal made unit are `naive`; `alpha² + 2/kappa` is the one von Mises-Fisher lobe
     // of the mean normal.
-    let options = SourceOptions { builtin_size: Size { width: 64, height: 64 }, ..SourceOptions::default() };
-    let map = read_source("builtin:foil".as_ref(), &options).unwrap();
     let methods = ["naive", "vmf:1"].map(|m| m.parse::<AnyMethod>().unwrap());
     let engines = ["plain", "kappa", "fit:1", "three"].map(|name| name.parse::<Origin>().unwrap());
-    let compared = |lobe: &str| {
-        let lobe = lobe.parse::<AnyLobe>().unwrap();
-        let subject = Subject {
-            name: "foil",
-            surface: &*map.surface,
-            lobe: &*lobe,
-            methods: &methods,
-            baked: &[],
-            engines: &engines,
-            storage: Precision::Single.into(),
-            filtering: true,
-        };
-        compare(&subject, &Unobserved)
-    };
+    let compared = |lobe: &str| compared(lobe, &methods, &engines, Precision::Single);
     let comparison = compared("ggx:0.16").unwrap();
     let names: Vec<&str> = comparison.rows.iter().map(|row| row.method.as_str()).collect();
     assert_eq!(names, ["naive", "vmf:1", "rule:plain", "rule:kappa", "rule:fit:1", "rule:three"]);

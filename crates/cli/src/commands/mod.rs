@@ -25,9 +25,9 @@ use serde::Serialize;
 use serde_json::Value;
 
 use ndfmap::Error;
-use ndfmap::maps::MapError;
+use ndfmap::maps::{MapError, NdfMap};
 
-use crate::voice::{self, Verbosity, say};
+use crate::voice::{self, Verbosity, say, warn};
 
 /// Bakes normal and displacement maps into filterable normal distribution maps, and measures what each
 /// method gains.
@@ -165,6 +165,17 @@ fn check_kept(path: &Path) -> Result<(), Error> {
         return Err(Error::Failed(format!("{}: is there, and `--no-clobber` keeps it", path.display())));
     }
     Ok(())
+}
+
+/// Warns of a baked map that is read alone, though a renderer's normal map is due near by.
+fn warn_of_missing_levels(path: &Path, map: &NdfMap) {
+    if map.header.from_level > 0 {
+        let from = map.header.from_level;
+        let what = format!(
+            "begins at level {from}: nearer than that its normal map is to be shaded (docs/compact.md)"
+        );
+        warn(path, &what);
+    }
 }
 
 /// Makes way for a file: says that it is replaced, or refuses to.

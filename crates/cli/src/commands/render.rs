@@ -30,7 +30,9 @@ use super::arguments::{
     BuiltinSize, EnvironmentArguments, STORAGE_HELP, SourceArguments, brdf_spelling, brdfs_help,
     environments_help, method_spelling, methods_help, positive, read_brdf, scene_name, size,
 };
-use super::{check_apart, check_kept, make_way, print, print_json, say_written, to_value};
+use super::{
+    check_apart, check_kept, make_way, print, print_json, say_written, to_value, warn_of_missing_levels,
+};
 #[cfg(feature = "gpu")]
 use crate::hushed::hushed;
 use crate::tables;
@@ -463,6 +465,7 @@ impl Render {
         if !map.header.attributes.is_empty() {
             warn(path, "the attributes that its lobes carry are not used: scenes bring their own colours");
         }
+        warn_of_missing_levels(path, &map);
         Ok(Some(BakedSurface { method: map.method(path)?, pyramid: map.pyramid }))
     }
 

@@ -6,13 +6,14 @@ use std::str::FromStr;
 
 use clap::Args;
 use ndfmap::core::brdf::{Brdf, ShadingModel};
+use ndfmap::core::compact::Compact;
 use ndfmap::core::ndf::{AnyMethod, DEFAULT_METHOD};
 use ndfmap::gpu::export::{Export, Language, TABLE};
 use ndfmap::maps::NdfMap;
 use serde_json::json;
 
 use super::arguments::{STANDARD, brdf_spelling, brdfs_help, method_spelling, methods_help, read_brdf};
-use super::{make_way, print_bytes, print_json, say_written};
+use super::{make_way, print_bytes, print_json, say_written, warn_of_missing_levels};
 use crate::voice::warn;
 use ndfmap::Error;
 
@@ -60,20 +61,19 @@ fn language(text: &str) -> Result<&'static str, String> {
 
 impl Shader {
     pub(super) fn run(self, json: bool) -> Result<(), Error> {
-        let map = self.map.as_deref().map(NdfMap::open).transpose()?;
-        let method: AnyMethod = match (&map, &self.map) {
-            (Some(map), Some(path)) => map.method(path)?,
-            _ => self.method.as_deref().unwrap_or(DEFAULT_METHOD).parse()?,
+        let (method, compact): (AnyMethod, Option<Compact>) = match &self.map {
+            None => (self.method.as_deref().unwrap_or(DEFAULT_METHOD).parse()?, None),
+            Some(path) => {
+                let map = NdfMap::open(path)?;
+                if !map.header.attributes.is_empty() {
+                    let why =
+                        "the attributes that its lobes carry are not used: a place brings its own colours";
+                    warn(path, why);
+                }
+                warn_of_missing_levels(path, &map);
+                (map.method(path)?, map.compact(path)?)
+            }
         };
-        let compact = match (&map, &self.map) {
-            (Some(map), Some(path)) => map.compact(path)?,
-            _ => None,
-        };
-        if let (Some(map), Some(path)) = (&map, &self.map)
-            && !map.header.attributes.is_empty()
-        {
-            warn(path, "the attributes that its lobes carry are not used: a place brings its own colours");
-        }
         let lobe = read_brdf(&self.brdf)?;
         let brdf = Brdf { lobe, shading: self.model };
         let output = self.output.as_ref().filter(|path| path.as_os_str() != STANDARD);

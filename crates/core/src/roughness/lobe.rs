@@ -1,7 +1,7 @@
 //! Effective lobes of an engine's own material: one lobe about the mean normal, made unit, as wide as the
 //! roughness beside it.
 //!
-//! What a formula makes of a map is measured so beside the methods, at texels and between them.
+//! Formulas are measured so beside the methods, at texels and between them.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;

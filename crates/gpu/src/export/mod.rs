@@ -372,7 +372,7 @@ mod tests {
         let range = |c: usize| Range { low: -0.125 * c as f32, high: 0.5 + 0.25 * c as f32 };
         for bits in Bits::ALL {
             let compact = Compact::new(bits, (0..4 * layers).map(range).collect(), method.encoding());
-            // What a sampler makes of integers: channel c holds 7 c + 3.
+            // Integers as a sampler reads them: channel c holds 7 c + 3.
             let integer = |c: usize| (7 * c + 3) as u16;
             let unorm = |c: usize| f32::from(integer(c)) / f32::from(bits.most());
             let text = channels_of(&compact, layers);

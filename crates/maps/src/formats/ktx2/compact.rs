@@ -56,6 +56,23 @@ struct Spooled {
     rows: Rows,
 }
 
+impl Spooled {
+    /// Spread of all rows over their extent.
+    fn spread(&self, extent: Extent) -> io::Result<Spread> {
+        let (mut spread, mut floats) = (Spread::new(extent), Vec::new());
+        for (level, (size, _)) in self.rows.levels.iter().enumerate() {
+            for layer in 0..self.rows.layout.layers {
+                for row in 0..size.height {
+                    floats.clear();
+                    self.read(Place { level, layer, row }, &mut floats)?;
+                    spread.add(layer, &floats);
+                }
+            }
+        }
+        Ok(spread)
+    }
+}
+
 impl FloatRows for Spooled {
     fn read(&self, place: Place, row: &mut Vec<f32>) -> io::Result<()> {
         let (size, start) = self.rows.levels[place.level];
@@ -211,19 +228,10 @@ impl NdfSink for CompactSink {
         let Self { file, spooled, header, bits, extent, zstd } = *self;
         let encoding = method_of(file.target(), &header)?.encoding();
         let layout = spooled.rows.layout;
-        let mut spread = Spread::new(extent);
-        let mut floats = Vec::new();
-        for (level, size) in level_sizes(layout.size).into_iter().enumerate() {
-            for (layer, row) in
-                (0..layout.layers).flat_map(|layer| (0..size.height).map(move |row| (layer, row)))
-            {
-                floats.clear();
-                let read = spooled.read(Place { level, layer, row }, &mut floats);
-                read.map_err(|e| MapError::io(file.target(), e))?;
-                spread.add(layer, &floats);
-            }
+        let mut compact = Compact::of_extent(bits, &extent, encoding);
+        if compact.trims() {
+            compact = compact.trimmed(&spooled.spread(extent).map_err(|e| MapError::io(file.target(), e))?);
         }
-        let compact = Compact::of_spread(bits, &spread, encoding);
         CompactMap { header: &header, layout, compact: &compact, rows: &spooled }.write(file, zstd)
     }
 }

@@ -210,7 +210,7 @@ fn write_ndf(path: &Path, map: &NdfMap, options: &WriteOptions) -> Result<u64, M
     check_channels(path, options)?;
     let (p, layout) = (&map.pyramid, map.pyramid.layout());
     if let Some(bits) = options.compact {
-        // What was read from integers goes back into them as it was.
+        // Integers that were read go back as they were.
         let own = map.compact(path)?.filter(|own| own.bits() == bits);
         let compact = match own {
             Some(own) => own,
