@@ -51,8 +51,10 @@ fn error(got: &Grid<[u8; 4]>, due: &Grid<[u8; 4]>) -> f64 {
 fn table(folder: &Path) -> Result<(), Box<dyn Error>> {
     let mut files: Vec<_> = std::fs::read_dir(folder)?.collect::<Result<Vec<_>, _>>()?;
     files.sort_by_key(std::fs::DirEntry::path);
-    println!("| map | encoder | seconds | of ours | rms as ASTC | rms as BC7 | bytes with Zstandard 3 |");
-    println!("|---|---|---|---|---|---|---|");
+    println!(
+        "| map | encoder | seconds | of ours | rms as ASTC | rms as BC7 | rms as ETC | bytes with Zstandard 3 |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
     for file in
         files.iter().map(std::fs::DirEntry::path).filter(|f| f.extension().is_some_and(|e| e == "rgba"))
     {
@@ -65,12 +67,12 @@ fn table(folder: &Path) -> Result<(), Box<dyn Error>> {
             let rms = |blocks| -> Result<f64, Box<dyn Error>> {
                 Ok(error(&transcode(&file, ktx2, &[size], blocks)?[0], &level).sqrt())
             };
-            let (astc, bc7) = (rms(Transcoded::Astc)?, rms(Transcoded::Bc7)?);
+            let (astc, bc7, etc) = (rms(Transcoded::Astc)?, rms(Transcoded::Bc7)?, rms(Transcoded::Etc)?);
             let name = &told["name"].as_str().unwrap_or_default();
             // All by one compressor, beside some hundred bytes of header.
             let bytes = zstd_bytes(ktx2)?;
             println!(
-                "| {name} | {encoder} | {seconds:.2} | {:.1} | {astc:.2} | {bc7:.2} | {bytes} |",
+                "| {name} | {encoder} | {seconds:.2} | {:.1} | {astc:.2} | {bc7:.2} | {etc:.2} | {bytes} |",
                 seconds / ours
             );
             Ok(())

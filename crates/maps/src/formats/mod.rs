@@ -9,6 +9,7 @@ mod basis;
 mod blocks;
 mod dds;
 mod decoded;
+mod etc;
 pub mod exr;
 mod hdr;
 mod jpeg;

@@ -4,12 +4,15 @@
 //! A block holds 16 texels in 128 bits. Five of its nineteen modes are written, those of one subset without
 //! alpha that have something to give: 8, one colour; 0, 192 values an end and 16 weights; 5, 256 and 8; 18,
 //! 32 and 32; 6, 160 and 4, with weights of its own for one channel. For each the principal axis of the
-//! colours gives two ends, which least squares refine; the mode with the least error wins. Hints for ETC and
-//! BC1, which are only for those who transcode to them, are left at zero.
+//! colours gives two ends, which least squares refine; the mode with the least error wins. Hints for ETC are
+//! in
+//! `etc.rs`; those for BC1, which only spare a transcoder some work, are left at zero.
 
 use glam::Vec3;
 use ndfmap_core::grid::Grid;
 use rayon::prelude::*;
+
+use super::etc::{Flat, Halves};
 
 /// Bytes of a block.
 pub(super) const BLOCK_BYTES: usize = 16;
@@ -18,13 +21,10 @@ pub(super) const BLOCK_BYTES: usize = 16;
 pub(super) const COLOUR_MODEL: u8 = 166;
 
 /// Texels of a block.
-const TEXELS: usize = 16;
+pub(super) const TEXELS: usize = 16;
 
 /// Mode that holds one colour: its code, of so many bits.
 const SOLID: (u32, u32) = (0x17, 5);
-
-/// Bits of the hints.
-const HINTS: u32 = 15;
 
 /// A mode of one subset, without alpha.
 struct Mode {
@@ -208,6 +208,7 @@ impl Packer {
             let mut bits = Bits::default();
             bits.put(SOLID.0, SOLID.1);
             texels[0].iter().chain(&[255]).for_each(|channel| bits.put(u32::from(*channel), 8));
+            Flat::of(texels[0]).fields().into_iter().for_each(|(value, length)| bits.put(value, length));
             return bits.bits;
         }
         let colours = texels.map(|texel| Vec3::from_array(texel.map(f32::from)));
@@ -222,7 +223,7 @@ impl Packer {
         });
         let fitted = fitted.map(|(i, channel)| self.fitted(&colours, i, channel));
         let best = fitted.min_by(|a, b| a.error.total_cmp(&b.error));
-        best.map_or(0, |fitted| self.written(&fitted))
+        best.map_or(0, |fitted| self.written(&fitted, Halves::of(texels).fields()))
     }
 
     /// Block in a mode, perhaps with a plane for a channel by itself.
@@ -254,14 +255,14 @@ impl Packer {
         colours.iter().zip(&plane.weights).map(off).sum()
     }
 
-    /// Bits of a block.
-    fn written(&self, fitted: &Fitted) -> u128 {
+    /// Bits of a block with these hints.
+    fn written(&self, fitted: &Fitted, hints: [(u32, u32); 6]) -> u128 {
         let mode = &self.modes[fitted.mode];
         let plane = fitted.plane.anchored(mode);
         let own = fitted.own.map(|(channel, own)| (channel, own.anchored(mode)));
         let mut bits = Bits::default();
         bits.put(mode.code, mode.code_bits);
-        bits.put(0, HINTS);
+        hints.into_iter().for_each(|(value, length)| bits.put(value, length));
         if let Some((channel, _)) = own {
             bits.put(channel as u32, 2);
         }
