@@ -40,9 +40,11 @@ fn main() -> ExitCode {
 /// Message of an error, with advice to the user of the program.
 fn said(error: &Error) -> String {
     match error {
-        // No device is to blame for an invalid shader.
+        // No device is to blame for a shader that cannot be.
         #[cfg(feature = "gpu")]
-        Error::Gpu(gpu) if !matches!(gpu, ndfmap::gpu::GpuError::Shader(_)) => {
+        Error::Gpu(gpu)
+            if !matches!(gpu, ndfmap::gpu::GpuError::Shader(_) | ndfmap::gpu::GpuError::Unsuited { .. }) =>
+        {
             format!("{error} (`--device cpu` renders without a GPU)")
         }
         _ => error.to_string(),

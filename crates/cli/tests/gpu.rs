@@ -138,6 +138,27 @@ fn what_only_a_gpu_can_do_is_not_asked_of_the_processor() {
 }
 
 #[test]
+fn shaders_for_renderers_read_their_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let texels: Vec<[u8; 3]> = (0..16 * 16).map(|i| [i as u8, 60, 90]).collect();
+    let size = ndfmap::core::grid::Size { width: 16, height: 16 };
+    let png = ndfmap::maps::formats::png::encode(&texels, size).unwrap();
+    std::fs::write(folder.path().join("albedo.png"), png).unwrap();
+    let bake = "bake builtin:foil map.ktx2 --map-size 16 --method vmf:2 --precision unorm8 --from-level 1";
+    json(folder.path(), &format!("{bake} --attribute srgb:albedo.png"));
+    for row in ndfmap::gpu::export::CONVENTIONS {
+        let value = json(folder.path(), &format!("shader map.ktx2 --for {} --lang hlsl", row.name));
+        let text = value["text"].as_str().unwrap();
+        // Two lobes, and the colours that they carry.
+        assert_eq!((value["renderer"].as_str(), value["layers"].as_u64()), (Some(row.name), Some(4)));
+        assert!(text.contains(row.summary) && text.contains("4 layers, RGBA8 unorm"), "{text}");
+        assert!(value["brdf"].is_null() && text.contains("ndf_shade_environment("));
+    }
+    let output = ndfmap(folder.path(), "shader map.ktx2");
+    assert!(said(&output).contains("not used") && said(&output).contains("--for"), "{}", said(&output));
+}
+
+#[test]
 fn shaders_come_in_every_language() {
     let folder = tempfile::tempdir().unwrap();
     for language in ndfmap::gpu::export::TABLE {
@@ -159,6 +180,12 @@ fn shaders_come_in_every_language() {
     let output = ndfmap(folder.path(), "shader --lang hsl");
     assert_eq!(output.status.code(), Some(2));
     assert!(said(&output).contains("did you mean `hlsl`?"), "{}", said(&output));
+    let output = ndfmap(folder.path(), "shader --for unreel");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(said(&output).contains("did you mean `unreal`?"), "{}", said(&output));
+    let output = ndfmap(folder.path(), "shader --for bevy --method sh:2");
+    assert_eq!(output.status.code(), Some(1));
+    assert!(said(&output).contains("`sh:2` has no lobes"), "{}", said(&output));
     let output = ndfmap(folder.path(), "shader --method toksvig");
     assert!(output.stdout.starts_with(b"// Normal distribution map, method toksvig"));
 }

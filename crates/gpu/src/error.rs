@@ -67,6 +67,14 @@ pub enum GpuError {
     /// A shader that does not hold together: our fault.
     #[error("a shader is not valid: {0}")]
     Shader(String),
+    /// A method that cannot have the shader that was asked for.
+    #[error("`{method}` {reason}")]
+    Unsuited {
+        /// Spelling of the method.
+        method: String,
+        /// Reason in words.
+        reason: &'static str,
+    },
     /// Anything else that the driver or wgpu complains about.
     #[error("{adapter}: {reason}")]
     Driver {

@@ -11,7 +11,7 @@ use ndfmap_core::brdf::{AnyLobe, Brdf, ShadingModel};
 use ndfmap_core::compact::{Bits, Compact, Range};
 use ndfmap_core::ndf::AnyMethod;
 use ndfmap_core::{brdf, ndf};
-use ndfmap_gpu::export::{Export, TABLE};
+use ndfmap_gpu::export::{CONVENTIONS, Export, Language, Shading, TABLE};
 
 /// True when there is a compiler of this name; without one a test is skipped, visibly, unless told to insist.
 fn has(compiler: &str) -> bool {
@@ -31,9 +31,14 @@ fn run(compiler: &str, arguments: &[&str], file: &Path) {
     assert!(output.status.success(), "{compiler} {arguments:?} {}: {said}", file.display());
 }
 
+/// A row of the table.
+fn find(name: &str) -> &'static Language {
+    TABLE.iter().find(|row| row.name == name).unwrap()
+}
+
 /// Every method in a language, each in a file of its own in `folder`: its name, and the bytes.
 fn all(language: &str) -> Vec<(String, Vec<u8>)> {
-    let language = TABLE.iter().find(|row| row.name == language).unwrap();
+    let language = find(language);
     let mut shaders = Vec::new();
     for (at, spelling) in ndf::TABLE.iter().flat_map(|row| row.samples).enumerate() {
         // Every lobe and model comes up, though not with every method.
@@ -45,11 +50,49 @@ fn all(language: &str) -> Vec<(String, Vec<u8>)> {
         let ranges = vec![Range { low: -0.25, high: 1.5 }; 4 * method.layers()];
         let bits = Bits::ALL.get(at % 4).filter(|_| method.filterable());
         let compact = bits.map(|bits| Compact::new(*bits, ranges, method.encoding()));
-        let export = Export { method: &*method, brdf: &brdf, compact: compact.as_ref() };
+        let export = Export { method: &*method, shading: Shading::Lobe(&brdf), compact: compact.as_ref() };
         let bytes = export.to(language).unwrap_or_else(|e| panic!("{spelling}: {e}"));
         shaders.push((format!("{at}"), bytes));
     }
     shaders
+}
+
+/// Every convention in a language, with every number of attributes and kind of texels, by every method that
+/// has lobes.
+fn materials(language: &Language) -> Vec<(String, Vec<u8>)> {
+    let methods: Vec<AnyMethod> =
+        ndf::TABLE.iter().flat_map(|row| row.samples).map(|spelling| spelling.parse().unwrap()).collect();
+    let lobed: Vec<&AnyMethod> = methods
+        .iter()
+        .filter(|method| method.filterable() && method.shader().form() == ndf::FormKind::Lobes)
+        .collect();
+    let mut shaders = Vec::new();
+    for (at, method) in lobed.iter().enumerate() {
+        let convention = &CONVENTIONS[at % CONVENTIONS.len()];
+        let attributes = if method.carries_attributes() { at % 3 } else { 0 };
+        let ranges = vec![Range { low: -0.25, high: 1.5 }; 4 * method.layers_with(attributes)];
+        let bits = Bits::ALL.get(at % 4);
+        let compact = bits.map(|bits| Compact::new(*bits, ranges, method.encoding()));
+        let shading = Shading::Materials { convention, attributes };
+        let bytes = Export { method: &***method, shading, compact: compact.as_ref() }
+            .to(language)
+            .unwrap_or_else(|e| panic!("{method} for {}: {e}", convention.name));
+        shaders.push((format!("{at}_{}", convention.name), bytes));
+    }
+    assert!(shaders.len() >= CONVENTIONS.len(), "some conventions are not tried");
+    shaders
+}
+
+#[test]
+fn methods_without_lobes_have_no_materials() {
+    for spelling in ["sh:2", "leadr", "naive:unnormalised"] {
+        let method = spelling.parse::<AnyMethod>().unwrap();
+        let shading = Shading::Materials { convention: &CONVENTIONS[0], attributes: 0 };
+        let refused = Export { method: &*method, shading, compact: None }.to(&TABLE[0]);
+        if method.shader().form() != ndf::FormKind::Lobes || !method.filterable() {
+            assert!(refused.unwrap_err().to_string().contains("has no lobes"), "{spelling}");
+        }
+    }
 }
 
 /// Shader that an engine would write around an included library.
@@ -62,6 +105,44 @@ out vec4 colour;
 void main() {
     NdfPlace place = NdfPlace(normalize(wi), normalize(wo), vec3(0.5), vec3(0.04));
     colour = vec4(ndf_shade(map, uv, place), 1.0);
+}
+";
+
+/// As [`GLSL_MAIN`], with a material.
+const GLSL_MATERIAL: &str = "
+uniform sampler2DArray map;
+uniform samplerCube room;
+in vec2 uv;
+in vec3 wi;
+in vec3 wo;
+out vec4 colour;
+void main() {
+    NdfLobes lobes = ndf_decode_lobes(map, uv);
+    NdfMaterial material = NdfMaterial(vec3(0.5), vec3(0.04), 0.25);
+    vec3 light = ndf_shade(lobes, material, normalize(wi), normalize(wo));
+    light += ndf_shade_environment(lobes, material, normalize(wo), mat3(1.0), room, 8.0);
+    light *= ndf_share(dFdx(uv), dFdy(uv), 1.0, 16.0);
+    colour = vec4(light, ndf_normal(lobes).z);
+}
+";
+
+/// As [`HLSL_MAIN`], with a material.
+const HLSL_MATERIAL: &str = "
+Texture2DArray<float4> map : register(t0);
+SamplerState map_sampler : register(s0);
+TextureCube<float4> room : register(t1);
+SamplerState room_sampler : register(s1);
+float4 main(float2 uv : TEXCOORD0, float3 wi : TEXCOORD1, float3 wo : TEXCOORD2) : SV_Target {
+    NdfLobes lobes = ndf_decode_lobes(map, map_sampler, uv);
+    NdfMaterial material = (NdfMaterial)0;
+    material.diffuse = float3(0.5, 0.5, 0.5);
+    material.specular = float3(0.04, 0.04, 0.04);
+    material.alpha = 0.25;
+    float3x3 frame = float3x3(1, 0, 0, 0, 1, 0, 0, 0, 1);
+    float3 light = ndf_shade(lobes, material, normalize(wi), normalize(wo));
+    light += ndf_shade_environment(lobes, material, normalize(wo), frame, room, room_sampler, 8.0);
+    light *= ndf_share(ddx(uv), ddy(uv), 1.0, 16.0);
+    return float4(light, ndf_normal(lobes).z);
 }
 ";
 
@@ -78,8 +159,7 @@ float4 main(float2 uv : TEXCOORD0, float3 wi : TEXCOORD1, float3 wo : TEXCOORD2)
 }
 ";
 
-fn glslang(language: &str, before: &str, after: &str, arguments: &[&str]) {
-    let shaders = all(language);
+fn glslang(shaders: Vec<(String, Vec<u8>)>, before: &str, after: &str, arguments: &[&str]) {
     if !has("glslangValidator") {
         return;
     }
@@ -102,22 +182,28 @@ fn glslang(language: &str, before: &str, after: &str, arguments: &[&str]) {
 
 #[test]
 fn glsl_compiles_in_a_shader_of_its_own() {
-    glslang("glsl", "#version 450", GLSL_MAIN, &["-S", "frag"]);
+    glslang(all("glsl"), "#version 450", GLSL_MAIN, &["-S", "frag"]);
+    glslang(materials(find("glsl")), "#version 450", GLSL_MATERIAL, &["-S", "frag"]);
 }
 
 #[test]
 fn glsl_es_compiles_in_a_shader_of_its_own() {
-    glslang("glsl-es", "#version 300 es", GLSL_MAIN, &["-S", "frag"]);
+    glslang(all("glsl-es"), "#version 300 es", GLSL_MAIN, &["-S", "frag"]);
+    // What a WebGL 2 shader says first.
+    let head = "#version 300 es\nprecision highp float;";
+    glslang(materials(find("glsl-es")), head, GLSL_MATERIAL, &["-S", "frag"]);
 }
 
 #[test]
 fn hlsl_compiles_in_a_shader_of_its_own() {
-    glslang("hlsl", "", HLSL_MAIN, &["-D", "-S", "frag", "-e", "main", "-V", "-o", "/dev/null"]);
+    let arguments = ["-D", "-S", "frag", "-e", "main", "-V", "-o", "/dev/null"];
+    glslang(all("hlsl"), "", HLSL_MAIN, &arguments);
+    glslang(materials(find("hlsl")), "", HLSL_MATERIAL, &arguments);
 }
 
 /// Hands every shader of a language to a compiler as it is.
 fn compile(language: &str, compiler: &str, arguments: &[&str]) {
-    let shaders = all(language);
+    let shaders = all(language).into_iter().chain(materials(find(language)));
     if !has(compiler) {
         return;
     }
@@ -143,7 +229,7 @@ fn wgsl_is_valid_to_another_front_end() {
 fn metal_has_no_bindings_and_our_names() {
     // There is no compiler for it outside Apple's machines: what can be seen is that it is a library, and
     // called as promised.
-    for (name, bytes) in all("msl") {
+    for (name, bytes) in all("msl").into_iter().chain(materials(find("msl"))) {
         let text = String::from_utf8(bytes).unwrap();
         assert!(text.contains("metal::float3 ndf_shade("), "{name}");
         assert!(!text.contains("[[buffer(") && !text.contains("fragment "), "{name}");
@@ -152,7 +238,7 @@ fn metal_has_no_bindings_and_our_names() {
 
 #[test]
 fn wgsl_names_are_the_librarys_own() {
-    for (name, bytes) in all("wgsl") {
+    for (name, bytes) in all("wgsl").into_iter().chain(materials(find("wgsl"))) {
         let text = String::from_utf8(bytes).unwrap();
         let module = naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{name}: {e}"));
         let functions = module.functions.iter().filter_map(|(_, function)| function.name.as_ref());
@@ -166,7 +252,7 @@ fn wgsl_names_are_the_librarys_own() {
 
 #[test]
 fn hlsl_structs_have_no_padding() {
-    for (name, bytes) in all("hlsl") {
+    for (name, bytes) in all("hlsl").into_iter().chain(materials(find("hlsl"))) {
         assert!(!String::from_utf8(bytes).unwrap().contains("_pad"), "{name}");
     }
 }

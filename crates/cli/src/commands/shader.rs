@@ -8,7 +8,7 @@ use clap::Args;
 use ndfmap::core::brdf::{Brdf, ShadingModel};
 use ndfmap::core::compact::Compact;
 use ndfmap::core::ndf::{AnyMethod, DEFAULT_METHOD};
-use ndfmap::gpu::export::{Export, Language, TABLE};
+use ndfmap::gpu::export::{CONVENTIONS, Convention, Export, Language, Shading, TABLE};
 use ndfmap::maps::NdfMap;
 use serde_json::json;
 
@@ -19,7 +19,7 @@ use ndfmap::Error;
 
 /// Write the shader of a method, for other programs
 #[derive(Debug, Args)]
-#[command(after_long_help = format!("{}\n\n{}\n\n{}", languages_help(), methods_help(), brdfs_help()))]
+#[command(after_long_help = format!("{}\n\n{}\n\n{}\n\n{}", languages_help(), renderers_help(), methods_help(), brdfs_help()))]
 pub(super) struct Shader {
     /// The baked map that the shader is for: its method, and the ranges of its integers
     #[arg(value_name = "MAP")]
@@ -27,6 +27,9 @@ pub(super) struct Shader {
     #[arg(short, long, value_parser = method_spelling, conflicts_with = "map", help = format!(
         "The method that the map is baked with [default: {DEFAULT_METHOD}]"))]
     method: Option<String>,
+    /// The renderer whose materials and lights the shader is for; without one it shades one lobe
+    #[arg(long = "for", value_name = "RENDERER", value_parser = convention, conflicts_with_all = ["brdf", "model"])]
+    renderer: Option<&'static Convention>,
     /// The reflectance lobe
     #[arg(long, default_value = "ggx:0.2", value_parser = brdf_spelling)]
     brdf: String,
@@ -49,6 +52,17 @@ fn languages_help() -> String {
     format!("Languages:\n{}", rows.collect::<Vec<_>>().join("\n"))
 }
 
+fn renderers_help() -> String {
+    let rows = CONVENTIONS.iter().map(|row| format!("  {:8} {}", row.name, row.summary));
+    format!("Renderers:\n{}", rows.collect::<Vec<_>>().join("\n"))
+}
+
+fn convention(text: &str) -> Result<&'static Convention, String> {
+    let names = || CONVENTIONS.iter().map(|row| row.name);
+    let small = text.to_lowercase();
+    CONVENTIONS.iter().find(|row| row.name == small).ok_or_else(|| super::arguments::unknown(text, names()))
+}
+
 fn find(name: &str) -> Option<&'static Language> {
     let small = name.to_lowercase();
     TABLE.iter().find(|row| row.name == small || row.aliases.contains(&small.as_str()))
@@ -61,25 +75,38 @@ fn language(text: &str) -> Result<&'static str, String> {
 
 impl Shader {
     pub(super) fn run(self, json: bool) -> Result<(), Error> {
-        let (method, compact): (AnyMethod, Option<Compact>) = match &self.map {
-            None => (self.method.as_deref().unwrap_or(DEFAULT_METHOD).parse()?, None),
+        let (method, compact, attributes): (AnyMethod, Option<Compact>, usize) = match &self.map {
+            None => (self.method.as_deref().unwrap_or(DEFAULT_METHOD).parse()?, None, 0),
             Some(path) => {
                 let map = NdfMap::open(path)?;
-                if !map.header.attributes.is_empty() {
-                    let why =
-                        "the attributes that its lobes carry are not used: a place brings its own colours";
+                let attributes = map.header.attributes.len();
+                if attributes > 0 && self.renderer.is_none() {
+                    let why = "the attributes that its lobes carry are not used: a place brings its own colours, or `--for`";
                     warn(path, why);
                 }
-                warn_of_missing_levels(path, &map);
-                (map.method(path)?, map.compact(path)?)
+                if attributes > 2 {
+                    let why = format!(
+                        "has {attributes} attributes, where shaders know two, albedo and specular colour"
+                    );
+                    return Err(Error::Request(format!("{}: {why}", path.display())));
+                }
+                if self.renderer.is_none() {
+                    warn_of_missing_levels(path, &map);
+                }
+                (map.method(path)?, map.compact(path)?, attributes)
             }
         };
         let lobe = read_brdf(&self.brdf)?;
         let brdf = Brdf { lobe, shading: self.model };
+        let shading = match self.renderer {
+            None => Shading::Lobe(&brdf),
+            Some(convention) => Shading::Materials { convention, attributes },
+        };
+        let layers = method.layers_with(if self.renderer.is_some() { attributes } else { 0 });
         let output = self.output.as_ref().filter(|path| path.as_os_str() != STANDARD);
         let ending = output.and_then(|path| Some(path.extension()?.to_str()?.to_owned()));
         let language = self.lang.or(ending.as_deref()).and_then(find).unwrap_or(&TABLE[0]);
-        let bytes = Export { method: &*method, brdf: &brdf, compact: compact.as_ref() }.to(language)?;
+        let bytes = Export { method: &*method, shading, compact: compact.as_ref() }.to(language)?;
         if let Some(file) = output {
             make_way(file)?;
             ndfmap::maps::atomic::write(file, &bytes)?;
@@ -93,10 +120,11 @@ impl Shader {
             })?;
             return print_json(&json!({
                 "method": method.to_string(),
-                "brdf": brdf.lobe.to_string(),
-                "model": self.model.name(),
+                "renderer": self.renderer.map(|row| row.name),
+                "brdf": self.renderer.is_none().then(|| brdf.lobe.to_string()),
+                "model": self.renderer.is_none().then(|| self.model.name()),
                 "language": language.name,
-                "layers": compact.as_ref().map_or(method.layers(), |c| c.bits().layers(method.layers())),
+                "layers": compact.as_ref().map_or(layers, |compact| compact.bits().layers(layers)),
                 "bytes": bytes.len(),
                 "output": self.output,
                 "text": text,

@@ -2,10 +2,10 @@
 // three axes, and to anisotropic filtering where the device has it. Call it where all pixels of a quad do
 // (it takes derivatives).
 
-fn ndf_shade(map: texture_2d_array<f32>, map_sampler: sampler, uv: vec2<f32>, place: NdfPlace) -> vec3<f32> {
+fn channels_at(map: texture_2d_array<f32>, map_sampler: sampler, uv: vec2<f32>) -> Channels {
     var channels: Channels;
     for (var layer = 0u; layer < ALL_LAYERS; layer++) {
         channels[layer] = textureSample(map, map_sampler, uv, layer);
     }
-    return ndf_shade_channels(&channels, place);
+    return channels;
 }

@@ -2,11 +2,10 @@
 // filtering on all three axes, and to anisotropic filtering where the device has it. Call it where all pixels
 // of a quad do (it takes derivatives).
 
-fn ndf_shade(map: texture_2d_array<f32>, map_sampler: sampler, uv: vec2<f32>, place: NdfPlace) -> vec3<f32> {
+fn channels_at(map: texture_2d_array<f32>, map_sampler: sampler, uv: vec2<f32>) -> Channels {
     var stored: array<vec4<f32>, STORED_LAYERS>;
     for (var layer = 0u; layer < STORED_LAYERS; layer++) {
         stored[layer] = textureSample(map, map_sampler, uv, layer);
     }
-    var channels = ndf_channels(stored);
-    return ndf_shade_channels(&channels, place);
+    return ndf_channels(stored);
 }

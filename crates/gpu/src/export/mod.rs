@@ -1,21 +1,24 @@
-//! Shaders for other programs: decoding and shading of one method with one lobe, in several languages.
+//! Shaders for other programs: decoding and shading of one method, in several languages, with one lobe or for
+//! the materials of a renderer.
 //!
 //! In [`TABLE`] a row is a language. WGSL is our own text, comments and all; the others are written by naga
 //! from the same text, as a library of functions whose names begin with `ndf_`, so that they stand in an
 //! engine's own shader without a clash. SPIR-V is no text to include: it is a whole fragment shader.
 
+mod conventions;
 mod names;
 
 use std::fmt::Write as _;
 
 use naga::back;
 use naga::compact::{KeepUnused, compact};
-use ndfmap_core::brdf::Brdf;
+use ndfmap_core::brdf::{Brdf, Lambert};
 use ndfmap_core::compact::{Bits, Compact};
-use ndfmap_core::ndf::Method;
+use ndfmap_core::ndf::{FormKind, Method};
 use ndfmap_core::shader::{self, LOOKUP};
 use ndfmap_core::units::SlopeVariance;
 
+pub use self::conventions::{Convention, TABLE as CONVENTIONS};
 use self::names::{PREFIX, foreign, is_own, prefixed};
 use crate::GpuError;
 use crate::link::{Linked, check};
@@ -28,8 +31,9 @@ pub struct Language {
     pub aliases: &'static [&'static str],
     /// Summary in one line, for help and docs.
     pub summary: &'static str,
-    /// Call of the library; `None` for a language without text to include, and so without a library.
-    call: Option<&'static str>,
+    /// Way of handing textures to the library; `None` for a language without text to include, and so without
+    /// a library.
+    textures: Option<Textures>,
     /// True for a language without variables at module scope: functions that need one take it as their last
     /// argument.
     passes_variables: bool,
@@ -40,11 +44,24 @@ pub struct Language {
     write: fn(&Linked) -> Result<Vec<u8>, String>,
 }
 
-/// Call in languages with texture and sampler apart.
-const WITH_SAMPLER: &str = "ndf_shade(map, map_sampler, uv, place)";
+/// A way of handing textures to functions.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Textures {
+    /// Texture and sampler apart.
+    WithSampler,
+    /// Samplers that are textures too.
+    Combined,
+}
 
-/// Call in languages whose samplers are textures too.
-const COMBINED: &str = "ndf_shade(map, uv, place)";
+impl Textures {
+    /// Arguments for a texture of this name.
+    fn arguments(self, name: &str) -> String {
+        match self {
+            Self::WithSampler => format!("{name}, {name}_sampler"),
+            Self::Combined => name.to_owned(),
+        }
+    }
+}
 
 /// Sentence about a measured lobe in a language without variables at module scope.
 const OWN_VARIABLE: &str = "\n\nThe last argument, after the place, is a `thread uint` of the caller's own that is 0: the functions count \
@@ -56,7 +73,7 @@ pub static TABLE: &[Language] = &[
         name: "wgsl",
         aliases: &["webgpu"],
         summary: "WebGPU Shading Language: our own text, with its comments",
-        call: Some(WITH_SAMPLER),
+        textures: Some(Textures::WithSampler),
         passes_variables: false,
         own_text: true,
         write: |linked| Ok(prefixed(&linked.text, &foreign(&linked.module)).into_bytes()),
@@ -65,7 +82,7 @@ pub static TABLE: &[Language] = &[
         name: "glsl",
         aliases: &["opengl", "vulkan-glsl"],
         summary: "GLSL 4.50, to be included after `#version`",
-        call: Some(COMBINED),
+        textures: Some(Textures::Combined),
         passes_variables: false,
         own_text: false,
         write: |linked| glsl(linked, back::glsl::Version::Desktop(450), ""),
@@ -74,7 +91,7 @@ pub static TABLE: &[Language] = &[
         name: "glsl-es",
         aliases: &["webgl", "essl"],
         summary: "GLSL ES 3.00 (WebGL 2), to be included after `#version`",
-        call: Some(COMBINED),
+        textures: Some(Textures::Combined),
         passes_variables: false,
         own_text: false,
         write: |linked| glsl(linked, back::glsl::Version::new_gles(300), ES_PRECISION),
@@ -83,7 +100,7 @@ pub static TABLE: &[Language] = &[
         name: "hlsl",
         aliases: &["directx", "d3d"],
         summary: "HLSL, shader model 5.1 and up",
-        call: Some(WITH_SAMPLER),
+        textures: Some(Textures::WithSampler),
         passes_variables: false,
         own_text: false,
         write: hlsl,
@@ -92,7 +109,7 @@ pub static TABLE: &[Language] = &[
         name: "msl",
         aliases: &["metal"],
         summary: "Metal Shading Language 2.4",
-        call: Some(WITH_SAMPLER),
+        textures: Some(Textures::WithSampler),
         passes_variables: true,
         own_text: false,
         write: msl,
@@ -101,19 +118,34 @@ pub static TABLE: &[Language] = &[
         name: "spirv",
         aliases: &["spir-v", "spv", "vulkan"],
         summary: "SPIR-V 1.3: a fragment shader `main`, map and sampler at set 0, bindings 0 and 1",
-        call: None,
+        textures: None,
         passes_variables: false,
         own_text: false,
         write: spirv,
     },
 ];
 
+/// Shading that a shader does.
+#[derive(Clone, Copy)]
+pub enum Shading<'a> {
+    /// One lobe in one model, the same everywhere: `ndf_shade` looks up and shades.
+    Lobe(&'a Brdf),
+    /// Materials of a renderer: `ndf_decode_lobes` looks up, `ndf_shade` and `ndf_shade_environment` take a
+    /// material.
+    Materials {
+        /// Renderer whose light it is.
+        convention: &'a Convention,
+        /// Attributes that the map's lobes carry, 0 to 2: albedo with roughness, and specular colour.
+        attributes: usize,
+    },
+}
+
 /// A shader to be exported.
 pub struct Export<'a> {
     /// Method whose baked map the shader reads.
     pub method: &'a dyn Method,
-    /// Lobe and its shading model.
-    pub brdf: &'a Brdf,
+    /// Shading around the map.
+    pub shading: Shading<'a>,
     /// Ranges of the map's integers; `None` for a map in floats.
     pub compact: Option<&'a Compact>,
 }
@@ -122,21 +154,29 @@ impl Export<'_> {
     /// Writes the shader in a language.
     ///
     /// # Errors
-    /// [`GpuError::Shader`] when the language cannot express the shader.
+    /// [`GpuError::Shader`] when the language cannot express the shader; [`GpuError::Unsuited`] for integers
+    /// of a method that is read texel by texel, and for materials of one whose texels are no sums of lobes.
     pub fn to(&self, language: &Language) -> Result<Vec<u8>, GpuError> {
         if self.compact.is_some() && !self.method.filterable() {
-            let why = "is read texel by texel, of a map in floats: bake it with `--precision half`";
-            return Err(GpuError::Shader(format!("`{}` {why}", self.method)));
+            let reason = "is read texel by texel, of a map in floats: bake it with `--precision half`";
+            return Err(GpuError::Unsuited { method: self.method.to_string(), reason });
         }
-        let library = self.library();
+        let (library, entry) = match self.shading {
+            Shading::Lobe(brdf) => (self.lobe_library(brdf), include_str!("entry.wgsl")),
+            Shading::Materials { convention, attributes } => {
+                if self.method.shader().form() != FormKind::Lobes || !self.method.filterable() {
+                    let reason = "has no lobes that a renderer could shade one by one: `vmf:J` has";
+                    return Err(GpuError::Unsuited { method: self.method.to_string(), reason });
+                }
+                (self.material_library(convention, attributes), include_str!("material_entry.wgsl"))
+            }
+        };
         // Our own text needs no entry point; naga wants one, to see which functions are used.
-        let entry = include_str!("entry.wgsl");
         let linked = if language.own_text { check(library)? } else { check(library + "\n" + entry)? };
         let body = (language.write)(&linked)
             .map_err(|e| GpuError::Shader(format!("{} cannot say it: {e}", language.name)))?;
-        let Some(call) = language.call else { return Ok(body) };
-        let own = language.passes_variables && self.brdf.lobe.measured().is_some();
-        let head: String = self.head(call, own).lines().fold(String::new(), |mut head, line| {
+        let Some(textures) = language.textures else { return Ok(body) };
+        let head: String = self.head(textures, language).lines().fold(String::new(), |mut head, line| {
             // Writing to a string cannot fail.
             let _ = writeln!(head, "{}", format!("// {line}").trim_end());
             head
@@ -144,61 +184,103 @@ impl Export<'_> {
         Ok([head.into_bytes(), body].concat())
     }
 
-    /// Linked text of the library, without an entry point.
-    fn library(&self) -> String {
-        let lobe = &*self.brdf.lobe;
+    /// Linked text of a library for one lobe, without an entry point.
+    fn lobe_library(&self, brdf: &Brdf) -> String {
+        let lobe = &*brdf.lobe;
         let (least, most) = (SlopeVariance::ZERO, SlopeVariance::ZERO);
-        let table = self.method.shader_table(self.brdf, least, most);
+        let table = self.method.shader_table(brdf, least, most);
         let entry = |(i, (lobe, diffuse)): (usize, (&[f32], f32))| {
             let (first, last, lobe) = (3 * i, 3 * i + 2, lobe[0]);
             format!("    brdf.table[{first}].x = {lobe:?};\n    brdf.table[{last}].w = {diffuse:?};\n")
         };
-        let brdf = format!(
+        let text = format!(
             "// The lobe {}, in the model `{}`.\nfn ndf_brdf() -> Brdf {{\n    var brdf: Brdf;\n    \
              brdf.base = {:?};\n    brdf.shading = {}u;\n{}    return brdf;\n}}\n",
             lobe,
-            self.brdf.shading,
+            brdf.shading,
             lobe.base() as f32,
-            self.brdf.shading.index(),
+            brdf.shading.index(),
             table.lobe().zip(table.diffuse()).enumerate().map(entry).collect::<String>()
         );
         let method = shader::link(self.method, lobe, 0);
         let library = include_str!("library.wgsl");
-        let filtered = self.method.filterable();
-        let integers =
-            self.compact.map_or_else(String::new, |compact| channels_of(compact, self.method.layers()));
-        let (lookup, own) = match (filtered, self.compact) {
-            (true, None) => ("", include_str!("filtered.wgsl")),
-            (true, Some(_)) => (&*integers, include_str!("integers.wgsl")),
-            (false, _) => (LOOKUP, include_str!("texels.wgsl")),
-        };
-        [&method, lookup, &brdf, library, own].join("\n")
+        if self.method.filterable() {
+            [&method, &*self.look_up(0), &text, library, include_str!("shaded.wgsl")].join("\n")
+        } else {
+            [&method, LOOKUP, &text, library, include_str!("texels.wgsl")].join("\n")
+        }
+    }
+
+    /// Linked text of a library for materials, without an entry point.
+    fn material_library(&self, convention: &Convention, attributes: usize) -> String {
+        // A method's text wants a lobe beside it, which materials do without.
+        let method = shader::link(self.method, &Lambert::SHARP, attributes);
+        let [lobes, material] = [include_str!("lobes.wgsl"), include_str!("material.wgsl")];
+        [&method, &*self.look_up(attributes), lobes, convention.text, material].join("\n")
+    }
+
+    /// Text that looks up the channels of a method whose channels may be mixed.
+    fn look_up(&self, attributes: usize) -> String {
+        match self.compact {
+            None => include_str!("filtered.wgsl").to_owned(),
+            Some(compact) => {
+                channels_of(compact, self.method.layers_with(attributes))
+                    + "\n"
+                    + include_str!("integers.wgsl")
+            }
+        }
     }
 
     /// Text at the head of the file.
-    fn head(&self, call: &str, own_variable: bool) -> String {
+    fn head(&self, textures: Textures, language: &Language) -> String {
         let sampler = if self.method.filterable() {
             "a sampler that filters linearly on all three axes"
         } else {
             "any sampler: this method reads texels one by one, of a map that repeats"
         };
         let method = self.method.to_string();
-        let (layers, texels) = match self.compact.map(Compact::bits) {
-            None => (self.method.layers(), "half floats"),
-            Some(bits) => (bits.layers(self.method.layers()), texels_of(bits)),
+        let (subject, attributes) = match self.shading {
+            Shading::Lobe(brdf) => (format!("lobe {}, model {}", brdf.lobe, brdf.shading.name()), 0),
+            Shading::Materials { convention, attributes } => {
+                (format!("for {} ({})", convention.name, convention.summary), attributes)
+            }
         };
-        let (lobe, shading) = (self.brdf.lobe.to_string(), self.brdf.shading.name());
+        let all = self.method.layers_with(attributes);
+        let (layers, texels) = match self.compact.map(Compact::bits) {
+            None => (all, "half floats"),
+            Some(bits) => (bits.layers(all), texels_of(bits)),
+        };
+        let map = textures.arguments("map");
+        let calls = match self.shading {
+            Shading::Lobe(brdf) => {
+                let own = language.passes_variables && brdf.lobe.measured().is_some();
+                format!(
+                    "ndf_shade({map}, uv, place)\n\n\
+                     with uv from 0 to 1 over the map, v down its rows, and a place in the tangent frame (x along u, y against v, z out):\n\
+                     unit vectors to light and eye, albedo, reflectance at normal incidence. It returns the radiance to the eye, for each\n\
+                     unit of the light's irradiance on a plane that faces it. Call it once a light, and add.{}",
+                    if own { OWN_VARIABLE } else { "" }
+                )
+            }
+            Shading::Materials { .. } => format!(
+                "lobes = ndf_decode_lobes({map}, uv)                              once a place\n    \
+                 ndf_shade(lobes, material, wi, wo)                       once a light\n    \
+                 ndf_shade_environment(lobes, material, wo, frame, {}, levels)\n\n\
+                 with uv from 0 to 1 over the map, v down its rows, and directions in the tangent frame (x along u, y against v, z\n\
+                 out). A material is a matt albedo, a reflectance at normal incidence, and a width `alpha`, the square of glTF's\n\
+                 roughness. A light's radiance comes for each unit of its irradiance on a plane that faces it; an environment's is\n\
+                 the mirrored light alone: matt light goes by `ndf_normal(lobes)`. A map without its finest level counts for\n\
+                 `ndf_share(...)` of the light, and the normal map for the rest.",
+                textures.arguments("room"),
+            ),
+        };
         format!(
-            "Normal distribution map, method {method}, lobe {lobe}, model {shading}. Made by ndfmap {}.\n\
+            "Normal distribution map, method {method}, {subject}. Made by ndfmap {}.\n\
              \n\
              Bind the map that `ndfmap bake --method {method}` made as a 2-D array texture of {layers} layers, {texels}, with all\n\
              its levels and no sRGB decoding, and {sampler}. Then call\n\
-             \n    {call}\n\n\
-             with uv from 0 to 1 over the map, v down its rows, and a place in the tangent frame (x along u, y against v, z out):\n\
-             unit vectors to light and eye, albedo, reflectance at normal incidence. It returns the radiance to the eye, for each\n\
-             unit of the light's irradiance on a plane that faces it. Call it once a light, and add.{}",
+             \n    {calls}",
             env!("CARGO_PKG_VERSION"),
-            if own_variable { OWN_VARIABLE } else { "" }
         )
     }
 }
