@@ -183,20 +183,30 @@ void ndfDecode( const in vec2 uv, const in mat3 frame, const in vec2 scale, cons
 }
 `;
 
-// The engine's own shading, once a lobe. Rooms are looked up as wide as GGX: alpha'² = alpha² + 2/kappa.
+// The engine's own shading, twice a lobe.
 const SHADING = /* glsl */`
-// GGX blurred by a Gaussian of normals, about: part a Gaussian, part a GGX, both as wide. A GGX alone has tails
-// as if every facet were so rough, a haze over the dark. docs/three.md has what other shares gave.
-float ndfDensity( const in float alpha, const in float variance, const in float u ) {
-	float widened = alpha * alpha + 2.0 * variance;
-	float u2 = max( u * u, 1e-4 );
-	float gaussian = exp( ( 1.0 - 1.0 / u2 ) / widened ) / ( PI * widened * u2 * u2 );
-	return mix( gaussian, D_GGX( sqrt( widened ), u ), alpha / sqrt( widened ) );
+// A GGX blurred by a Gaussian of normals keeps the tail of the GGX: far off, it is this share of a GGX as wide
+// as both. The rest is a Gaussian.
+float ndfTail( const in float alpha, const in float variance ) {
+	return alpha * alpha / ( alpha * alpha + 2.0 * variance );
 }
 
-// A facet that shines lies between the lobe's mean and the half vector, as the widths of the lobe and of the
-// material say: the mean of the product of two Gaussians. Its cosines and its masking are the light's, and the
-// engine works them out; D is that of the widened lobe. Diffuse light, coats and sheen go by the normal map.
+float ndfCore( const in float width, const in float u ) {
+	float u2 = max( u * u, 1e-4 );
+	return exp( ( 1.0 - 1.0 / u2 ) / ( width * width ) ) / ( PI * width * width * u2 * u2 );
+}
+
+// The engine's mirrored light by a facet, for each unit of the facets' density.
+vec3 ndfByFacet( const in vec3 facet, const in vec3 halfDir, const in float alpha, const in IncidentLight directLight, const in vec3 viewDir, const in PhysicalMaterial material ) {
+	return saturate( dot( facet, directLight.direction ) ) * directLight.color
+		* BRDF_GGX( directLight.direction, viewDir, facet, material ) * material.multiScatteringCompensation
+		/ max( D_GGX( alpha, saturate( dot( facet, halfDir ) ) ), 1e-6 );
+}
+
+// In the core the facet that shines lies between the lobe's mean and the half vector, as the widths of the lobe
+// and of the material say: the mean of the product of two Gaussians. In the tail every normal of the lobe shines
+// alike, and the facet is the lobe's own. Cosines and masking are the facet's, and the engine works them out.
+// Diffuse light, coats and sheen go by the normal map.
 void RE_Direct_Ndf( const in IncidentLight directLight, const in vec3 geometryPosition, const in vec3 geometryNormal, const in vec3 geometryViewDir, const in vec3 geometryClearcoatNormal, const in PhysicalMaterial material, inout ReflectedLight reflectedLight ) {
 	vec3 specular = reflectedLight.directSpecular;
 	RE_Direct_Physical( directLight, geometryPosition, geometryNormal, geometryViewDir, geometryClearcoatNormal, material, reflectedLight );
@@ -205,30 +215,42 @@ void RE_Direct_Ndf( const in IncidentLight directLight, const in vec3 geometryPo
 	float alpha = pow2( material.roughness );
 	for ( int j = 0; j < NDF_ALL; j ++ ) {
 		if ( ndfWeight[ j ] <= 0.0 ) continue;
-		vec3 facet = normalize( 0.5 * alpha * alpha * ndfNormal[ j ] + ndfVariance[ j ] * halfDir );
-		vec3 shines = saturate( dot( facet, directLight.direction ) ) * directLight.color
-			* BRDF_GGX( directLight.direction, geometryViewDir, facet, material ) * material.multiScatteringCompensation;
-		float ratio = ndfDensity( alpha, ndfVariance[ j ], saturate( dot( ndfNormal[ j ], halfDir ) ) )
-			/ max( D_GGX( alpha, saturate( dot( facet, halfDir ) ) ), 1e-6 );
-		reflectedLight.directSpecular += ndfWeight[ j ] * ratio * shines;
+		float width = sqrt( alpha * alpha + 2.0 * ndfVariance[ j ] );
+		float u = saturate( dot( ndfNormal[ j ], halfDir ) );
+		float tail = ndfTail( alpha, ndfVariance[ j ] );
+		vec3 shines = tail * D_GGX( width, u ) * ndfByFacet( ndfNormal[ j ], halfDir, alpha, directLight, geometryViewDir, material );
+		if ( tail < 1.0 ) {
+			vec3 facet = normalize( 0.5 * alpha * alpha * ndfNormal[ j ] + ndfVariance[ j ] * halfDir );
+			shines += ( 1.0 - tail ) * ndfCore( width, u ) * ndfByFacet( facet, halfDir, alpha, directLight, geometryViewDir, material );
+		}
+		reflectedLight.directSpecular += ndfWeight[ j ] * shines;
 	}
 }
 
 #ifdef USE_ENVMAP
-PhysicalMaterial ndfMaterial( const in PhysicalMaterial material, const in int j, const in vec3 viewDir ) {
-	PhysicalMaterial own = material;
-	float alpha = pow2( material.roughness );
-	own.roughness = min( sqrt( sqrt( alpha * alpha + 2.0 * ndfVariance[ j ] ) ), 1.0 );
-	own.dfg = texture2D( dfgLUT, vec2( own.roughness, saturate( dot( ndfNormal[ j ], viewDir ) ) ) ).rg;
-	return own;
+// A lobe's normals spread mirrored light twice as far as they lie apart in the plane of incidence, and less across
+// it, by the cosine to the eye. Direction and share are the material's own.
+vec3 ndfRadiance( const in vec3 viewDir, const in int j, const in float roughness ) {
+#ifdef ENVMAP_TYPE_PMREM
+	vec3 normal = ndfNormal[ j ];
+	float cosine = saturate( dot( normal, viewDir ) );
+	float alpha = pow2( roughness );
+	float width = sqrt( alpha * alpha + ( 1.0 + cosine * cosine ) * ndfVariance[ j ] );
+	vec3 towards = normalize( mix( reflect( - viewDir, normal ), normal, pow4( roughness ) ) );
+	towards = transformDirectionByInverseViewMatrix( towards, viewMatrix );
+	return textureLod( envMap, envMapRotation * towards, roughnessToMip( min( sqrt( width ), 1.0 ) ) ).rgb * envMapIntensity;
+#else
+	return vec3( 0.0 );
+#endif
 }
 
 void RE_IndirectSpecular_Ndf( const in vec3 radiance, const in vec3 irradiance, const in vec3 clearcoatRadiance, const in vec3 geometryPosition, const in vec3 geometryNormal, const in vec3 geometryViewDir, const in vec3 geometryClearcoatNormal, const in PhysicalMaterial material, inout ReflectedLight reflectedLight ) {
 	for ( int j = 0; j < NDF_ALL; j ++ ) {
 		float weight = ndfWeight[ j ];
 		if ( weight <= 0.0 ) continue;
-		PhysicalMaterial own = ndfMaterial( material, j, geometryViewDir );
-		vec3 seen = getIBLRadiance( geometryViewDir, ndfNormal[ j ], own.roughness );
+		PhysicalMaterial own = material;
+		own.dfg = texture2D( dfgLUT, vec2( material.roughness, saturate( dot( ndfNormal[ j ], geometryViewDir ) ) ) ).rg;
+		vec3 seen = ndfRadiance( geometryViewDir, j, material.roughness );
 		RE_IndirectSpecular_Physical( weight * seen, weight * irradiance, weight * clearcoatRadiance, geometryPosition, ndfNormal[ j ], geometryViewDir, geometryClearcoatNormal, own, reflectedLight );
 	}
 }

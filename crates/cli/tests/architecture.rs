@@ -291,6 +291,15 @@ fn every_crate_can_be_packed() {
 const WIDTH: usize = 110;
 
 #[test]
+fn bevys_lobes_are_ours() {
+    let read = |path: &str| std::fs::read_to_string(root().join(path)).unwrap();
+    let ours = read("crates/gpu/src/export/lobes.wgsl");
+    let (purpose, rest) = ours.split_once('\n').unwrap();
+    let theirs = read("integrations/bevy/src/lobes.wgsl");
+    assert_eq!(theirs, format!("{purpose}\n#define_import_path ndfmap::lobes\n{rest}"));
+}
+
+#[test]
 fn prose_is_no_wider_than_a_page() {
     for file in tracked() {
         let extension = file.extension().unwrap_or_default().to_string_lossy().into_owned();
