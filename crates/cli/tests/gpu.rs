@@ -152,6 +152,7 @@ fn shaders_for_renderers_read_their_map() {
         // Two lobes, and the colours that they carry.
         assert_eq!((value["renderer"].as_str(), value["layers"].as_u64()), (Some(row.name), Some(4)));
         assert!(text.contains(row.summary) && text.contains("4 layers, RGBA8 unorm"), "{text}");
+        assert!(text.contains("level 1 of the normal map"), "{text}");
         assert!(value["brdf"].is_null() && text.contains("ndf_shade_environment("));
     }
     let output = ndfmap(folder.path(), "shader map.ktx2");

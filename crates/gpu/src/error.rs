@@ -67,11 +67,11 @@ pub enum GpuError {
     /// A shader that does not hold together: our fault.
     #[error("a shader is not valid: {0}")]
     Shader(String),
-    /// A method that cannot have the shader that was asked for.
-    #[error("`{method}` {reason}")]
+    /// A method or a language that cannot have the shader that was asked for.
+    #[error("`{subject}` {reason}")]
     Unsuited {
-        /// Spelling of the method.
-        method: String,
+        /// Spelling of the method, or of the language.
+        subject: String,
         /// Reason in words.
         reason: &'static str,
     },

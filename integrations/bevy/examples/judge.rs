@@ -255,12 +255,15 @@ fn picture(bytes: &[u8], samples: usize) -> Vec<u8> {
     let side = SIDE as usize;
     let row = side * samples;
     let half = |at: usize| f16::from_le_bytes([bytes[2 * at], bytes[2 * at + 1]]).to_f32();
-    // Bevy's own light has no value now and then, where a normal has no length: such samples are left out.
+    // Bevy's own light has no value now and then, where a normal has no length: of the truth's samples such
+    // are left out, and what half floats cannot hold counts for their largest.
     let mean = |x: usize, y: usize, c: usize| {
         let at = |i: usize| ((y * samples + i / samples) * row + x * samples + i % samples) * 4 + c;
-        let seen = (0..samples * samples).map(|i| half(at(i))).filter(|value| value.is_finite());
-        let (sum, count) = seen.fold((0.0_f32, 0.0_f32), |(sum, count), value| (sum + value, count + 1.0));
-        sum / count.max(1.0)
+        let seen = (0..samples * samples).map(|i| half(at(i))).filter(|value| !value.is_nan());
+        let (sum, count) =
+            seen.fold((0.0, 0.0), |(sum, count), value: f32| (sum + value.min(65504.0), count + 1.0));
+        assert!(count > 0.0, "pixel {x}, {y} has no value");
+        sum / count
     };
     (0..side * side * 4)
         .flat_map(|i| mean(i / 4 % side, side - 1 - i / 4 / side, i % 4).to_le_bytes())

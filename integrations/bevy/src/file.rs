@@ -8,8 +8,14 @@ use serde::Deserialize;
 /// Lobes at most, as many as shaders have room for.
 pub(crate) const MOST_LOBES: usize = 8;
 
-/// Side at most, in texels: more than a texture may have.
-const MOST_TEXELS: u32 = 1 << 15;
+/// Side at most, in texels: what devices take.
+const MOST_TEXELS: u32 = 1 << 14;
+
+/// Layers at most: lobes, and fifteen attributes of each.
+const MOST_LAYERS: u32 = 16 * MOST_LOBES as u32;
+
+/// Levels at most that a file may leave out.
+const MOST_LEFT_OUT: u32 = 14;
 
 /// Reason why a file is no map that can be shown.
 #[derive(Debug, thiserror::Error)]
@@ -35,16 +41,19 @@ pub enum FileError {
     /// Ranges are missing, not finite, or the wrong way round.
     #[error("has no sound range for each channel")]
     Ranges,
-    /// Layers or levels are too few.
-    #[error("has {found} {what}, where at least {due} are due")]
-    TooFew {
+    /// Layers or levels are too few or too many.
+    #[error("has {found} {what}, where {due} are due")]
+    Count {
         /// Layers or levels.
         what: &'static str,
         /// Number that the file has.
         found: u32,
-        /// Number that it should have.
+        /// Number that it should have: of layers, at least so many.
         due: u32,
     },
+    /// The file leaves out more levels than a map has.
+    #[error("leaves out {0} levels")]
+    LeftOut(u32),
     /// A side is 0, or longer than any texture.
     #[error("is {width} by {height} texels")]
     Size {
@@ -135,43 +144,51 @@ impl File {
         if ![width, height].iter().all(|side| (1..=MOST_TEXELS).contains(side)) {
             return Err(FileError::Size { width, height });
         }
-        if (told.layer_count as usize) < lobes {
+        if !(lobes as u32..=MOST_LAYERS).contains(&told.layer_count) {
             let (found, due) = (told.layer_count, lobes as u32);
-            return Err(FileError::TooFew { what: "layers", found, due });
+            return Err(FileError::Count { what: "layers", found, due });
         }
         let compressed = match told.supercompression_scheme {
             None => false,
             Some(SupercompressionScheme::Zstandard) => true,
             Some(_) => return Err(FileError::Texels),
         };
+        let (wrap, from_level) = (header.wrap, header.from_level);
+        if from_level > MOST_LEFT_OUT {
+            return Err(FileError::LeftOut(from_level));
+        }
+        let (found, due) = (file.levels().len() as u32, u32::BITS - width.max(height).leading_zeros());
+        if found != due {
+            return Err(FileError::Count { what: "levels", found, due });
+        }
         let texel = if ranges.is_some() { 4 } else { 8 };
+        let layers = told.layer_count as usize;
         let levels = file.levels().enumerate().map(|(level, stored)| {
-            let side = |side: u32| u64::from((side >> level).max(1));
+            let side = |side: u32| (side >> level).max(1) as usize;
             let layer = side(width) * side(height) * texel;
-            let whole = layer * u64::from(told.layer_count);
             let damaged = |reason: String| FileError::Level { level, reason };
+            let due = |found: usize| damaged(format!("{found} bytes, where {} are due", layer * layers));
+            // Before anything is unpacked: what the file says of itself.
+            let told = if compressed { stored.uncompressed_byte_length } else { stored.data.len() as u64 };
+            if told != (layer * layers) as u64 {
+                return Err(due(told as usize));
+            }
             let mut bytes = Vec::new();
+            // Lobes come first, attributes behind them, which are not wanted.
+            let wanted = layer * lobes;
             if compressed {
                 let decoder = ruzstd::decoding::StreamingDecoder::new(stored.data);
                 let decoder = decoder.map_err(|e| damaged(e.to_string()))?;
-                // One byte more than is due is enough to see that it lies.
-                decoder.take(whole + 1).read_to_end(&mut bytes).map_err(|e| damaged(e.to_string()))?;
+                decoder.take(wanted as u64).read_to_end(&mut bytes).map_err(|e| damaged(e.to_string()))?;
             } else {
-                bytes.extend_from_slice(stored.data);
+                bytes.extend_from_slice(&stored.data[..wanted]);
             }
-            if bytes.len() as u64 != whole {
-                return Err(damaged(format!("{} bytes, where {whole} are due", bytes.len())));
+            if bytes.len() != wanted {
+                return Err(due(bytes.len()));
             }
-            // Lobes come first, attributes behind them.
-            bytes.truncate(layer as usize * lobes);
             Ok(bytes)
         });
         let levels = levels.collect::<Result<Vec<_>, _>>()?;
-        let due = u32::BITS - width.max(height).leading_zeros();
-        if levels.len() as u32 != due {
-            return Err(FileError::TooFew { what: "levels", found: levels.len() as u32, due });
-        }
-        let (wrap, from_level) = (header.wrap, header.from_level);
         Ok(Self { size: [width, height], lobes, levels, ranges, wrap, from_level })
     }
 }
@@ -261,9 +278,13 @@ mod tests {
         assert!(changed("vmf:1", "gmm:4").contains("baked by `gmm:4`"));
         assert!(changed("vmf:1", "vmf:4").contains("no sound range"));
         assert!(changed("[0,1]", "[2,1]").contains("no sound range"));
+        assert!(changed("\"from_level\":1", "\"from_level\":15").contains("leaves out 15 levels"));
         assert!(changed("\"bits\":8", "\"bits\":10").contains("kind that is not read"));
         assert!(reason(&ktx2(97, 2, HEADER, &[64, 16, 8])).contains("kind that is not read"));
-        assert!(reason(&ktx2(BYTES, 2, HEADER, &[64, 16])).contains("2 levels"));
+        assert!(reason(&ktx2(BYTES, 2, HEADER, &[64, 16])).contains("2 levels, where 3 are due"));
+        assert!(reason(&ktx2(BYTES, 2, HEADER, &[4; 40])).contains("40 levels, where 3 are due"));
+        assert!(reason(&ktx2(BYTES, 0, HEADER, &[64, 16, 8])).contains("0 layers"));
+        assert!(reason(&ktx2(BYTES, u32::MAX, HEADER, &[64, 16, 8])).contains("4294967295 layers"));
         assert!(reason(&ktx2(BYTES, 2, HEADER, &[60, 16, 8])).contains("damaged level 0"));
     }
 

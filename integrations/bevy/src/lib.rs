@@ -2,6 +2,7 @@
 //! shaded by Bevy's own light. Maps are what `ndfmap bake --method vmf:J` writes.
 //!
 //! ```no_run
+//! use bevy::image::{ImageAddressMode, ImageLoaderSettings, ImageSampler, ImageSamplerDescriptor};
 //! use bevy::prelude::*;
 //! use bevy_ndfmap::{NdfMap3d, NdfPlugin};
 //!
@@ -9,9 +10,22 @@
 //!     App::new().add_plugins((DefaultPlugins, NdfPlugin)).add_systems(Startup, set_up).run();
 //! }
 //!
-//! fn set_up(mut commands: Commands, assets: Res<AssetServer>, mut materials:
-//! ResMut<Assets<StandardMaterial>>) {
-//!     let material = StandardMaterial { normal_map_texture: Some(assets.load("leather.png")), ..default() };
+//! fn set_up(
+//!     mut commands: Commands,
+//!     assets: Res<AssetServer>,
+//!     mut materials: ResMut<Assets<StandardMaterial>>,
+//! ) {
+//!     // Normals are numbers and no colours, and repeat as their map does. A glTF says so itself.
+//!     let normals = assets.load_builder().with_settings(|settings: &mut ImageLoaderSettings| {
+//!         settings.is_srgb = false;
+//!         settings.sampler = ImageSampler::Descriptor(ImageSamplerDescriptor {
+//!             address_mode_u: ImageAddressMode::Repeat,
+//!             address_mode_v: ImageAddressMode::Repeat,
+//!             ..ImageSamplerDescriptor::linear()
+//!         });
+//!     });
+//!     let material =
+//!         StandardMaterial { normal_map_texture: Some(normals.load("leather.png")), ..default() };
 //!     commands.spawn((
 //!         Mesh3d(assets.load("chair.glb#Mesh0/Primitive0")),
 //!         MeshMaterial3d(materials.add(material)),
@@ -46,6 +60,6 @@ impl Plugin for NdfPlugin {
             .init_asset::<NdfMap>()
             .init_asset_loader::<NdfLoader>()
             .init_resource::<material::Made>()
-            .add_systems(Update, material::apply);
+            .add_systems(Update, (material::forget, material::apply).chain());
     }
 }

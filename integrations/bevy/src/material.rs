@@ -61,8 +61,12 @@ impl MaterialExtension for NdfLobes {
         layout: &MeshVertexBufferLayoutRef,
         key: MaterialExtensionKey<Self>,
     ) -> Result<(), SpecializedMeshPipelineError> {
-        // Without tangents Bevy's own normal maps do nothing; here it is an error, which Bevy logs.
-        layout.0.get_layout(&[Mesh::ATTRIBUTE_TANGENT.at_shader_location(0)])?;
+        // Without tangents Bevy's own normal maps do nothing; here it is an error, which Bevy logs. The same
+        // goes for coordinates.
+        layout.0.get_layout(&[
+            Mesh::ATTRIBUTE_TANGENT.at_shader_location(0),
+            Mesh::ATTRIBUTE_UV_0.at_shader_location(1),
+        ])?;
         if let Some(fragment) = &mut descriptor.fragment {
             fragment.shader_defs.push(ShaderDefVal::UInt("NDF_LOBES".into(), key.bind_group_data.0));
             fragment.shader_defs.push(ShaderDefVal::UInt("NDF_MOST".into(), MOST_LOBES as u32));
@@ -77,19 +81,22 @@ pub enum Refusal {
     /// The map takes the place of a normal map, which near by is what is seen.
     #[error("has no normal map, whose place a map takes")]
     NoNormalMap,
-    /// Light that lobes do not have.
+    /// Part of the material that lobes do not have.
     #[error("has {0}, which lobes do not have")]
-    Light(&'static str),
+    Part(&'static str),
 }
 
 impl NdfMap {
     /// Returns a standard material with this map's lobes. It is drawn forward.
     ///
     /// # Errors
-    /// [`Refusal`] for a material without a normal map, and for one with light that lobes do not have.
+    /// [`Refusal`] for a material without a normal map, and for one with parts that lobes do not have.
     pub fn material(&self, base: &StandardMaterial) -> Result<NdfMaterial, Refusal> {
         if base.normal_map_texture.is_none() {
             return Err(Refusal::NoNormalMap);
+        }
+        if base.depth_map.is_some() {
+            return Err(Refusal::Part("a depth map"));
         }
         let others = [
             ("a clear coat", base.clearcoat),
@@ -98,7 +105,7 @@ impl NdfMap {
             ("diffuse transmission", base.diffuse_transmission),
         ];
         if let Some((what, _)) = others.iter().find(|(_, strength)| *strength > 0.0) {
-            return Err(Refusal::Light(what));
+            return Err(Refusal::Part(what));
         }
         let filled = |values: &[Vec4]| std::array::from_fn(|j| values.get(j).copied().unwrap_or_default());
         let ranges = Ranges {
@@ -119,9 +126,27 @@ impl NdfMap {
 #[derive(Component, Clone, Debug, Deref)]
 pub struct NdfMap3d(pub Handle<NdfMap>);
 
-/// Materials that were made, by those that they were made of.
+/// Materials that were made and are in use, by those that they were made of.
 #[derive(Resource, Default)]
-pub(crate) struct Made(HashMap<(AssetId<StandardMaterial>, AssetId<NdfMap>), Handle<NdfMaterial>>);
+pub(crate) struct Made(HashMap<(AssetId<StandardMaterial>, AssetId<NdfMap>), AssetId<NdfMaterial>>);
+
+/// Forgets materials whose material or map changed, so that what comes after has the new one.
+pub(crate) fn forget(
+    mut made: ResMut<Made>,
+    mut materials: MessageReader<AssetEvent<StandardMaterial>>,
+    mut maps: MessageReader<AssetEvent<NdfMap>>,
+) {
+    for event in materials.read() {
+        if let AssetEvent::Modified { id } | AssetEvent::Removed { id } = event {
+            made.0.retain(|(material, _), _| material != id);
+        }
+    }
+    for event in maps.read() {
+        if let AssetEvent::Modified { id } | AssetEvent::Removed { id } = event {
+            made.0.retain(|(_, map), _| map != id);
+        }
+    }
+}
 
 type Waiting<'w, 's> = Query<'w, 's, (Entity, &'static NdfMap3d, &'static MeshMaterial3d<StandardMaterial>)>;
 
@@ -136,12 +161,13 @@ pub(crate) fn apply(
     for (entity, map, own) in &waiting {
         let (Some(loaded), Some(base)) = (maps.get(&map.0), standard.get(&own.0)) else { continue };
         let key = (own.id(), map.id());
-        let material = match made.0.get(&key) {
-            Some(material) => material.clone(),
+        let known = made.0.get(&key).and_then(|id| materials.get_strong_handle(*id));
+        let material = match known {
+            Some(material) => material,
             None => match loaded.material(base) {
                 Ok(material) => {
                     let material = materials.add(material);
-                    made.0.insert(key, material.clone());
+                    made.0.insert(key, material.id());
                     material
                 }
                 Err(refusal) => {

@@ -236,10 +236,11 @@ fn lit(in: pbr_types::PbrInput, lobes: ptr<function, array<NdfLobe, ALL>>) -> ve
 fn fragment(in: VertexOutput, @builtin(front_facing) is_front: bool) -> FragmentOutput {
     var input = pbr_input_from_standard_material(in, is_front);
     input.material.base_color = pbr_functions::alpha_discard(input.material, input.material.base_color);
+    var bare = in.uv;
 #ifdef STANDARD_MATERIAL_NORMAL_MAP_UV_B
-    let bare = in.uv_b;
-#else
-    let bare = in.uv;
+#ifdef VERTEX_UVS_B
+    bare = in.uv_b;
+#endif
 #endif
     let uv = (input.material.uv_transform * vec3<f32>(bare, 1.0)).xy;
     let frame = pbr_functions::calculate_tbn_mikktspace(input.world_normal, in.world_tangent);

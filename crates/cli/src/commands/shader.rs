@@ -73,10 +73,24 @@ fn language(text: &str) -> Result<&'static str, String> {
     find(text).map(|row| row.name).ok_or_else(|| super::arguments::unknown(text, names()))
 }
 
+/// Kind of map that a shader is for.
+struct Subject {
+    method: AnyMethod,
+    /// Ranges of its integers.
+    compact: Option<Compact>,
+    /// Attributes that its lobes carry.
+    attributes: usize,
+    /// Levels of the normal map that it leaves out.
+    from_level: usize,
+}
+
 impl Shader {
     pub(super) fn run(self, json: bool) -> Result<(), Error> {
-        let (method, compact, attributes): (AnyMethod, Option<Compact>, usize) = match &self.map {
-            None => (self.method.as_deref().unwrap_or(DEFAULT_METHOD).parse()?, None, 0),
+        let Subject { method, compact, attributes, from_level } = match &self.map {
+            None => {
+                let method = self.method.as_deref().unwrap_or(DEFAULT_METHOD).parse()?;
+                Subject { method, compact: None, attributes: 0, from_level: 0 }
+            }
             Some(path) => {
                 let map = NdfMap::open(path)?;
                 let attributes = map.header.attributes.len();
@@ -84,7 +98,7 @@ impl Shader {
                     let why = "the attributes that its lobes carry are not used: a place brings its own colours, or `--for`";
                     warn(path, why);
                 }
-                if attributes > 2 {
+                if attributes > 2 && self.renderer.is_some() {
                     let why = format!(
                         "has {attributes} attributes, where shaders know two, albedo and specular colour"
                     );
@@ -93,14 +107,15 @@ impl Shader {
                 if self.renderer.is_none() {
                     warn_of_missing_levels(path, &map);
                 }
-                (map.method(path)?, map.compact(path)?, attributes)
+                let (method, compact) = (map.method(path)?, map.compact(path)?);
+                Subject { method, compact, attributes, from_level: map.header.from_level }
             }
         };
         let lobe = read_brdf(&self.brdf)?;
         let brdf = Brdf { lobe, shading: self.model };
         let shading = match self.renderer {
             None => Shading::Lobe(&brdf),
-            Some(convention) => Shading::Materials { convention, attributes },
+            Some(convention) => Shading::Materials { convention, attributes, from_level },
         };
         let layers = method.layers_with(if self.renderer.is_some() { attributes } else { 0 });
         let output = self.output.as_ref().filter(|path| path.as_os_str() != STANDARD);

@@ -21,10 +21,22 @@ struct NdfLobe {
     weight: f32,
     // Variance of its slopes along each axis.
     variance: f32,
-    // Colours and roughness that the lobe carries, where the map has attributes; else 0.
+    // Colours that the lobe carries, where the map has attributes: the first is its albedo, the second its
+    // reflectance at normal incidence. Else 0.
     diffuse: vec3<f32>,
     specular: vec3<f32>,
-    roughness: f32,
+}
+
+// A tangent frame, in the space of an environment: unit vectors along u, against v, and out of the surface.
+struct NdfFrame {
+    tangent: vec3<f32>,
+    bitangent: vec3<f32>,
+    normal: vec3<f32>,
+}
+
+// Direction in the frame's space of one in the frame.
+fn ndf_outward(frame: NdfFrame, towards: vec3<f32>) -> vec3<f32> {
+    return towards.x * frame.tangent + towards.y * frame.bitangent + towards.z * frame.normal;
 }
 
 // Lobes of a place. Their weights add up to 1.
@@ -40,23 +52,21 @@ fn ndf_decode_lobes(map: texture_2d_array<f32>, map_sampler: sampler, uv: vec2<f
     for (var j = 0u; j < LOBES; j++) {
         let carried = params_of(&channels, j, SurfaceParams(vec3<f32>(0.0), 0.0, vec3<f32>(0.0)));
         let lobe = decoded[j];
-        lobes.lobe[j] = NdfLobe(direction(lobe), lobe.weight, lobe.variance, carried.diffuse, carried.specular,
-            carried.roughness);
+        lobes.lobe[j] = NdfLobe(direction(lobe), lobe.weight, lobe.variance, carried.diffuse, carried.specular);
     }
     return lobes;
 }
 
-// The material of a lobe: its own colours where it carries them. Roughness of lobes is a variance of slopes.
+// The material of a lobe: its own colours where it carries them, as wide as the renderer has it.
 fn ndf_material(lobe: NdfLobe, material: NdfMaterial) -> NdfMaterial {
     var own = material;
     if ATTRIBUTES > 0u {
         own.diffuse = lobe.diffuse;
-        own.alpha = ndf_widened(material.alpha, lobe.roughness);
     }
     if ATTRIBUTES > 1u {
         own.specular = lobe.specular;
     }
-    own.alpha = clamp(own.alpha, NDF_LEAST_ALPHA, 1.0);
+    own.alpha = min(ndf_width(material.alpha), 1.0);
     return own;
 }
 
@@ -128,13 +138,13 @@ fn ndf_mirrored(lobe: NdfLobe, material: NdfMaterial, wo: vec3<f32>) -> NdfMirro
     );
 }
 
-// Mirrored light of an environment that a cube holds, blurred more on each of its `levels`; `frame` leads
-// from the tangent frame to the cube's.
+// Mirrored light of an environment that a cube holds, blurred more on each of its `levels`; `frame` lies in
+// the cube's space.
 fn ndf_shade_environment(
     lobes: NdfLobes,
     material: NdfMaterial,
     wo: vec3<f32>,
-    frame: mat3x3<f32>,
+    frame: NdfFrame,
     room: texture_cube<f32>,
     room_sampler: sampler,
     levels: f32,
@@ -146,7 +156,7 @@ fn ndf_shade_environment(
             let seen = ndf_mirrored(lobe, material, wo);
             let level = ndf_room_level(seen.roughness, levels);
             light += lobe.weight * seen.tint
-                * textureSampleLevel(room, room_sampler, frame * seen.direction, level).xyz;
+                * textureSampleLevel(room, room_sampler, ndf_outward(frame, seen.direction), level).xyz;
         }
     }
     return light;

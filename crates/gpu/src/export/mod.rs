@@ -135,8 +135,10 @@ pub enum Shading<'a> {
     Materials {
         /// Renderer whose light it is.
         convention: &'a Convention,
-        /// Attributes that the map's lobes carry, 0 to 2: albedo with roughness, and specular colour.
+        /// Attributes that the map's lobes carry, 0 to 2: matt albedo, and reflectance at normal incidence.
         attributes: usize,
+        /// Levels of the normal map that the map leaves out.
+        from_level: usize,
     },
 }
 
@@ -159,14 +161,18 @@ impl Export<'_> {
     pub fn to(&self, language: &Language) -> Result<Vec<u8>, GpuError> {
         if self.compact.is_some() && !self.method.filterable() {
             let reason = "is read texel by texel, of a map in floats: bake it with `--precision half`";
-            return Err(GpuError::Unsuited { method: self.method.to_string(), reason });
+            return Err(GpuError::Unsuited { subject: self.method.to_string(), reason });
         }
         let (library, entry) = match self.shading {
             Shading::Lobe(brdf) => (self.lobe_library(brdf), include_str!("entry.wgsl")),
-            Shading::Materials { convention, attributes } => {
+            Shading::Materials { convention, attributes, .. } => {
                 if self.method.shader().form() != FormKind::Lobes || !self.method.filterable() {
                     let reason = "has no lobes that a renderer could shade one by one: `vmf:J` has";
-                    return Err(GpuError::Unsuited { method: self.method.to_string(), reason });
+                    return Err(GpuError::Unsuited { subject: self.method.to_string(), reason });
+                }
+                if language.textures.is_none() {
+                    let reason = "is a whole shader, where materials are a renderer's own: take glsl, and compile both";
+                    return Err(GpuError::Unsuited { subject: language.name.to_owned(), reason });
                 }
                 (self.material_library(convention, attributes), include_str!("material_entry.wgsl"))
             }
@@ -241,7 +247,7 @@ impl Export<'_> {
         let method = self.method.to_string();
         let (subject, attributes) = match self.shading {
             Shading::Lobe(brdf) => (format!("lobe {}, model {}", brdf.lobe, brdf.shading.name()), 0),
-            Shading::Materials { convention, attributes } => {
+            Shading::Materials { convention, attributes, .. } => {
                 (format!("for {} ({})", convention.name, convention.summary), attributes)
             }
         };
@@ -262,17 +268,36 @@ impl Export<'_> {
                     if own { OWN_VARIABLE } else { "" }
                 )
             }
-            Shading::Materials { .. } => format!(
-                "lobes = ndf_decode_lobes({map}, uv)                              once a place\n    \
-                 ndf_shade(lobes, material, wi, wo)                       once a light\n    \
-                 ndf_shade_environment(lobes, material, wo, frame, {}, levels)\n\n\
-                 with uv from 0 to 1 over the map, v down its rows, and directions in the tangent frame (x along u, y against v, z\n\
-                 out). A material is a matt albedo, a reflectance at normal incidence, and a width `alpha`, the square of glTF's\n\
-                 roughness. A light's radiance comes for each unit of its irradiance on a plane that faces it; an environment's is\n\
-                 the mirrored light alone: matt light goes by `ndf_normal(lobes)`. A map without its finest level counts for\n\
-                 `ndf_share(...)` of the light, and the normal map for the rest.",
-                textures.arguments("room"),
-            ),
+            Shading::Materials { from_level, .. } => {
+                let calls = [
+                    ("lobes = ndf_decode_lobes(", format!("{map}, uv)"), "once a place"),
+                    ("ndf_shade(", "lobes, material, wi, wo)".to_owned(), "once a light"),
+                    (
+                        "ndf_shade_environment(",
+                        format!("lobes, material, wo, frame, {}, levels)", textures.arguments("room")),
+                        "",
+                    ),
+                ];
+                let lines = calls.map(|(name, arguments, when)| {
+                    format!("{:64}{when}", format!("{name}{arguments}")).trim_end().to_owned()
+                });
+                let share = if from_level == 0 {
+                    String::new()
+                } else {
+                    format!(
+                        "\nThe map's finest level is level {from_level} of the normal map: it counts for `ndf_share(dx, dy, \
+                         {from_level}.0, taps)` of the light,\nand the normal map for the rest."
+                    )
+                };
+                format!(
+                    "{}\n\n\
+                     with uv from 0 to 1 over the map, v down its rows, and directions in the tangent frame (x along u, y against v, z\n\
+                     out). A material is a matt albedo, a reflectance at normal incidence, and a width `alpha`, the square of glTF's\n\
+                     roughness. A light's radiance comes for each unit of its irradiance on a plane that faces it; an environment's is\n\
+                     the mirrored light alone: matt light goes by `ndf_normal(lobes)`.{share}",
+                    lines.join("\n    "),
+                )
+            }
         };
         format!(
             "Normal distribution map, method {method}, {subject}. Made by ndfmap {}.\n\

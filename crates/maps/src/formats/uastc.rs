@@ -5,8 +5,7 @@
 //! alpha that have something to give: 8, one colour; 0, 192 values an end and 16 weights; 5, 256 and 8; 18,
 //! 32 and 32; 6, 160 and 4, with weights of its own for one channel. For each the principal axis of the
 //! colours gives two ends, which least squares refine; the mode with the least error wins. Hints for ETC are
-//! in
-//! `etc.rs`; those for BC1, which only spare a transcoder some work, are left at zero.
+//! in `etc.rs`; those for BC1, which only spare a transcoder some work, are left at zero.
 
 use glam::Vec3;
 use ndfmap_core::grid::Grid;

@@ -1,13 +1,16 @@
-// The material PBR of Babylon.js 9: Fresnel up to 25 times the reflectance, light passed on between facets.
+// The material PBR of Babylon.js 9, as it is without its options: light passed on between facets.
 
-const NDF_LEAST_ALPHA: f32 = 0.0005;
+// Width of the GGX that a material is drawn with.
+fn ndf_width(alpha: f32) -> f32 {
+    return alpha + 0.0005;
+}
 
 fn ndf_visibility(alpha: f32, incident: f32, seen: f32, u: f32) -> f32 {
     return ndf_smith(alpha, incident, seen);
 }
 
 fn ndf_tint(f0: vec3<f32>, u: f32) -> vec3<f32> {
-    return ndf_schlick(f0, saturate(25.0 * max(f0.x, max(f0.y, f0.z))), u);
+    return ndf_schlick(f0, 1.0, u);
 }
 
 fn ndf_compensation(f0: vec3<f32>, alpha: f32, seen: f32) -> vec3<f32> {

@@ -1,7 +1,10 @@
 // The standard material of Bevy 0.19: Fresnel up to 16.5 times the reflectance, light passed on between
 // facets.
 
-const NDF_LEAST_ALPHA: f32 = 0.007921;
+// Width of the GGX that a material is drawn with.
+fn ndf_width(alpha: f32) -> f32 {
+    return max(alpha, 0.007921);
+}
 
 fn ndf_visibility(alpha: f32, incident: f32, seen: f32, u: f32) -> f32 {
     return ndf_smith(alpha, incident, seen);

@@ -1,6 +1,9 @@
 // Smith's masking, Schlick's Fresnel up to 1, light reflected once: what papers call Cook-Torrance.
 
-const NDF_LEAST_ALPHA: f32 = 0.001;
+// Width of the GGX that a material is drawn with.
+fn ndf_width(alpha: f32) -> f32 {
+    return max(alpha, 0.001);
+}
 
 fn ndf_visibility(alpha: f32, incident: f32, seen: f32, u: f32) -> f32 {
     return ndf_smith(alpha, incident, seen);

@@ -1,7 +1,10 @@
 // The physical material of three.js, r187: Fresnel by a Gaussian in place of a power, light passed on between
 // facets.
 
-const NDF_LEAST_ALPHA: f32 = 0.002025;
+// Width of the GGX that a material is drawn with.
+fn ndf_width(alpha: f32) -> f32 {
+    return max(alpha, 0.002025);
+}
 
 fn ndf_visibility(alpha: f32, incident: f32, seen: f32, u: f32) -> f32 {
     return ndf_smith(alpha, incident, seen);

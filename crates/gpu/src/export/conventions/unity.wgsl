@@ -1,6 +1,9 @@
 // The lit material of Unity's universal pipeline: masking and Fresnel in one fraction of the light's angle.
 
-const NDF_LEAST_ALPHA: f32 = 0.0078125;
+// Width of the GGX that a material is drawn with.
+fn ndf_width(alpha: f32) -> f32 {
+    return max(alpha, 0.0078125);
+}
 
 fn ndf_visibility(alpha: f32, incident: f32, seen: f32, u: f32) -> f32 {
     return 0.25 / (max(u * u, 0.1) * (alpha + 0.5));

@@ -1,7 +1,10 @@
 // The default lit material of Unreal: Smith's masking without its roots, Fresnel up to 50 times the
 // reflectance.
 
-const NDF_LEAST_ALPHA: f32 = 0.0004;
+// Width of the GGX that a material is drawn with.
+fn ndf_width(alpha: f32) -> f32 {
+    return max(alpha, 0.0004);
+}
 
 fn ndf_visibility(alpha: f32, incident: f32, seen: f32, u: f32) -> f32 {
     let masked = incident * (seen * (1.0 - alpha) + alpha);
