@@ -7,6 +7,7 @@
 
 mod conventions;
 mod names;
+mod prune;
 
 use std::fmt::Write as _;
 
@@ -20,6 +21,7 @@ use ndfmap_core::units::SlopeVariance;
 
 pub use self::conventions::{Convention, TABLE as CONVENTIONS};
 use self::names::{PREFIX, foreign, is_own, prefixed};
+use self::prune::{declares, pruned};
 use crate::GpuError;
 use crate::link::{Linked, check};
 
@@ -76,7 +78,13 @@ pub static TABLE: &[Language] = &[
         textures: Some(Textures::WithSampler),
         passes_variables: false,
         own_text: true,
-        write: |linked| Ok(prefixed(&linked.text, &foreign(&linked.module)).into_bytes()),
+        write: |linked| {
+            let text = pruned(&linked.text);
+            // A local may have the name of what was left out: it keeps its own.
+            let mut names = foreign(&linked.module);
+            names.retain(|name| declares(&text, name));
+            Ok(prefixed(&text, &names).into_bytes())
+        },
     },
     Language {
         name: "glsl",
