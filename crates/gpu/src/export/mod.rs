@@ -165,7 +165,8 @@ impl Export<'_> {
     ///
     /// # Errors
     /// [`GpuError::Shader`] when the language cannot express the shader; [`GpuError::Unsuited`] for integers
-    /// of a method that is read texel by texel, and for materials of one whose texels are no sums of lobes.
+    /// of a method that is read texel by texel, for materials of one whose texels are no sums of lobes, and
+    /// for materials in a language that is no text.
     pub fn to(&self, language: &Language) -> Result<Vec<u8>, GpuError> {
         if self.compact.is_some() && !self.method.filterable() {
             let reason = "is read texel by texel, of a map in floats: bake it with `--precision half`";
