@@ -196,7 +196,7 @@ fn glsl_compiles_in_a_shader_of_its_own() {
 #[test]
 fn glsl_es_compiles_in_a_shader_of_its_own() {
     glslang(all("glsl-es"), "#version 300 es", GLSL_MAIN, &["-S", "frag"]);
-    // What a WebGL 2 shader says first.
+    // Lines that a WebGL 2 shader begins with.
     let head = "#version 300 es\nprecision highp float;";
     glslang(materials(find("glsl-es")), head, GLSL_MATERIAL, &["-S", "frag"]);
 }

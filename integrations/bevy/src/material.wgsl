@@ -40,7 +40,7 @@ struct Ranges {
 @group(#{MATERIAL_BIND_GROUP}) @binding(101) var ndf_sampler: sampler;
 @group(#{MATERIAL_BIND_GROUP}) @binding(102) var<uniform> ranges: Ranges;
 
-// One more than the map's: the last is the normal map's own, which fades.
+// Lobes of the map and one more, the last: the normal map's own, which fades.
 const ALL = #{NDF_LOBES} + 1;
 
 struct NdfLobe {

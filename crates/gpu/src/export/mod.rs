@@ -136,7 +136,7 @@ pub static TABLE: &[Language] = &[
 /// Shading that a shader does.
 #[derive(Clone, Copy)]
 pub enum Shading<'a> {
-    /// One lobe in one model, the same everywhere: `ndf_shade` looks up and shades.
+    /// Lobe in a model, the same everywhere: `ndf_shade` looks up and shades.
     Lobe(&'a Brdf),
     /// Materials of a renderer: `ndf_decode_lobes` looks up, `ndf_shade` and `ndf_shade_environment` take a
     /// material.

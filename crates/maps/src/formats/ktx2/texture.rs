@@ -343,7 +343,7 @@ mod tests {
 
     #[test]
     fn flat_blocks_keep_their_colour_as_etc() {
-        // One grey or colour to a block. Without hints they all turn black.
+        // Each block has a grey or a colour of its own. Without hints all turn black.
         let level = Grid::from_fn(Size { width: 128, height: 128 }, |x, y| {
             let i = (y / 4 * 32 + x / 4) as u32;
             if i < 256 {
