@@ -175,6 +175,49 @@ fn a_sharp_lobe_is_the_renderers_own_light() {
     }
 }
 
+/// Entry that shades channels of one lobe with two attributes.
+const CARRIED: &str = "
+@group(0) @binding(0) var<storage, read> input: array<vec4<f32>>;
+@group(0) @binding(1) var<storage, read_write> output: array<vec4<f32>>;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    var channels = ndf_Channels(input[0], input[1], input[2]);
+    let material = NdfMaterial(vec3<f32>(0.9), vec3<f32>(0.9), 0.25);
+    let wi = normalize(vec3<f32>(0.3, 0.1, 1.0));
+    output[id.x] = vec4<f32>(ndf_shade(ndf_lobes_of(&channels), material, wi, normalize(vec3<f32>(-0.2, 0.4, 1.0))), 0.0);
+}
+";
+
+#[test]
+fn lobes_bring_their_own_colours_and_the_material_its_width() {
+    let Some(device) = device() else { return };
+    let method = "vmf:1".parse::<AnyMethod>().unwrap();
+    let shading = Shading::Materials { convention: &CONVENTIONS[0], attributes: 2, from_level: 0 };
+    let wgsl = TABLE.iter().find(|row| row.name == "wgsl").unwrap();
+    let library = Export { method: &*method, shading, compact: None }.to(wgsl).unwrap();
+    // A lobe of weight a half and no width, whose attributes are stored times its weight; the fourth channel
+    // of a picture of three is 1.
+    let (matt, f0) = (DVec3::new(0.2, 0.4, 0.6), DVec3::new(0.3, 0.1, 0.5));
+    let half = |v: DVec3| (0.5 * v).as_vec3().extend(0.5).to_array();
+    let input = [[0.5, 0.0, 0.0, 0.0], half(matt), half(f0)];
+    let text = String::from_utf8(library).unwrap() + CARRIED;
+    let output = device.compute(&text, bytemuck::cast_slice(&input), 16, 1).unwrap();
+    let light: &[[f32; 4]] = bytemuck::cast_slice(&output);
+    let probe = Probe {
+        normal: DVec3::Z,
+        variance: 0.0,
+        alpha: 0.25,
+        f0,
+        wi: DVec3::new(0.3, 0.1, 1.0).normalize(),
+        wo: DVec3::new(-0.2, 0.4, 1.0).normalize(),
+    };
+    let due = sharp("plain", &probe, DVec3::Z) + matt * probe.wi.z / PI;
+    let off = (Vec3::new(light[0][0], light[0][1], light[0][2]).as_dvec3() - due).abs().max_element();
+    // Single floats.
+    assert!(off < 1e-5, "{light:?} for {due}");
+}
+
 /// Mean light over a lobe's normals, of von Mises and Fisher, by a fine grid.
 fn mean(name: &str, p: &Probe) -> DVec3 {
     let kappa = 1.0 / p.variance;

@@ -47,10 +47,15 @@ struct NdfLobes {
 // Looks up a place. Call it where all pixels of a quad do: it takes derivatives.
 fn ndf_decode_lobes(map: texture_2d_array<f32>, map_sampler: sampler, uv: vec2<f32>) -> NdfLobes {
     var channels = channels_at(map, map_sampler, uv);
-    let decoded = decode(&channels);
+    return lobes_of(&channels);
+}
+
+// Lobes of channels that were looked up.
+fn lobes_of(channels: ptr<function, Channels>) -> NdfLobes {
+    let decoded = decode(channels);
     var lobes: NdfLobes;
     for (var j = 0u; j < LOBES; j++) {
-        let carried = params_of(&channels, j, SurfaceParams(vec3<f32>(0.0), 0.0, vec3<f32>(0.0)));
+        let carried = params_of(channels, j, SurfaceParams(vec3<f32>(0.0), 0.0, vec3<f32>(0.0)));
         let lobe = decoded[j];
         lobes.lobe[j] = NdfLobe(direction(lobe), lobe.weight, lobe.variance, carried.diffuse, carried.specular);
     }
